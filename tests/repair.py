@@ -14,8 +14,7 @@ from mcz.container.chunks import FOOT, build_foot
 from mcz.container.packets import FRAME, Packet, build_packet, implied_by
 from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
-from mcz.container.segments import mask_of
-from mcz.container.segments import parse_header as parse_segment
+from mcz.container.segments import mask_of, parse_segment_header
 from mcz.container.source import open_source
 from tools.fuzz import repair
 from tools.fuzz.repair import Piece, pieces_of, table_of, with_payload
@@ -84,7 +83,7 @@ def imply_frames(packets: Iterable[Packet]) -> list[Packet]:
             due += 1
             continue
         with suppress(mcz.FormatError):
-            header, _ = parse_segment(packet.body)
+            header, _ = parse_segment_header(packet.body)
             if header.signal == 0:
                 due, mask = header.stop, mask_of(packet.body)
         implied.append(packet)

@@ -291,8 +291,11 @@ def test_individuals_of_movement(tmp_path: Path) -> None:
         (lambda data: data.rename(position="place"), "no variable 'position'"),
         (lambda data: data.isel(individuals=0), "along time, space, keypoints, not"),
         (lambda data: data.assign_coords(space=["x", "z", "y"]), "positions along x, z, y"),
-        (lambda data: data.assign_coords(time=data.time * 1.5), "no frames of 100.0 a second"),
-        (lambda data: data.drop_attrs().assign_attrs(time_unit="seconds"), "no attribute 'fps'"),
+        (lambda data: data.assign_coords(time=data.time * 1.5), "not at frames of 100.0 a second"),
+        (
+            lambda data: data.drop_attrs().assign_attrs(time_unit="seconds"),
+            "without an attribute 'fps'",
+        ),
         (lambda data: data.drop_vars("space"), "no coordinates along space"),
     ],
 )

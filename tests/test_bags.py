@@ -107,8 +107,8 @@ def test_bags_of_others_are_checked(archive: Path, tmp_path: Path) -> None:
     [
         ("bagit.txt", "BagIt-Version: 9\nTag-File-Character-Encoding: UTF-8\n", "'9' is not known"),
         ("bagit.txt", "BagIt-Version: 1.0\nTag-File-Character-Encoding: X\n", "'X' is not known"),
-        ("bagit.txt", "nothing\n", "no name and value"),
-        ("manifest-sha256.txt", "zz  data/a\n", "line 1 is no digest and path"),
+        ("bagit.txt", "nothing\n", "not a name and a value"),
+        ("manifest-sha256.txt", "zz  data/a\n", "line 1 is not a digest and a path"),
         ("manifest-sha256.txt", "00  ../a\n", "'../a' does not belong there"),
         ("manifest-sha256.txt", "00  data/../../a\n", "does not belong there"),
         ("manifest-sha256.txt", "00  /data/a\n", "does not belong there"),

@@ -20,7 +20,7 @@ from mcz import Motion, OptionError
 from mcz.bench import bjontegaard, ladder, peers, report, tasks
 from mcz.bench.bjontegaard import bd_rate, bd_sqnr
 from mcz.bench.cases import Case, Variant, find_cases, load, preset_of, variants_of
-from mcz.bench.measure import cpu_seconds, peak_bytes, point, speeds
+from mcz.bench.measure import cpu_seconds, measure, peak_bytes, speeds
 from mcz.bench.report import bench
 from mcz.bench.tables import Table
 from mcz.bench.tasks import KINDS, Runner, Task, perform
@@ -160,7 +160,7 @@ def test_cases_of_folders(samples: Path, tmp_path: Path) -> None:
 
 
 def test_a_point_is_what_the_quality_record_says(case: Case, tmp_path: Path) -> None:
-    found = point(case, Variant("mrdwt"), {"T_g": 0.5})
+    found = measure(case, Variant("mrdwt"), {"T_g": 0.5})
     mcz.write(load(case).motion, tmp_path / "a.mcz", codec="mrdwt", T_g=0.5)
     with mcz.open(tmp_path / "a.mcz") as file:
         quality = file.only_clip().quality

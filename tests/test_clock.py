@@ -96,7 +96,7 @@ def test_a_table_has_the_times_that_it_rounds(tmp_path: Path, digits: int) -> No
     near(write_and_read(motion).times, meant)
     line = motion.timeline
     assert line is not None and line.runs == [(0, 16), (16, 26)] and np.isnan(line.steps).any()
-    near(np.diff(line.even)[:15], np.full(15, 1 / 120))
+    near(np.diff(line.regular_times)[:15], np.full(15, 1 / 120))
 
 
 def test_a_table_that_begins_late_has_a_first_time(tmp_path: Path) -> None:
@@ -182,7 +182,7 @@ def test_a_decimated_clip_keeps_its_times(tmp_path: Path) -> None:
 def test_one_missing_frame_is_a_gap_however_few_digits_are_printed() -> None:
     times = np.array([0.0, 0.01, 0.02, 0.04, 0.05])
     line = Timeline(times, Fraction(100), rounding=0.005)
-    near(line.even, times)
+    near(line.regular_times, times)
     near(line.steps, [0.01, 0.01, np.nan, 0.01])
     coarse = np.round(np.arange(50) / 60, 2)
     near(Timeline(coarse, Fraction(60), rounding=0.005).steps, np.full(49, 1 / 60))

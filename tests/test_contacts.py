@@ -82,7 +82,7 @@ def test_a_foot_stands_between_its_steps() -> None:
     standing = found.frames("lfoot")
     assert standing.sum() == sum(run.n_frames for run in found.runs)
     assert standing[[10, 150, 290]].all() and not standing[[90, 210]].any()
-    with pytest.raises(MotionError, match="'body' is none of those looked at: lfoot"):
+    with pytest.raises(MotionError, match="'body' is not one of the feet examined: lfoot"):
         found.frames("body")
 
 
@@ -148,7 +148,7 @@ def test_what_has_no_contacts_is_refused() -> None:
     with pytest.raises(MotionError, match="angle unit is unknown"):
         contacts(turning)
     own = Signal(np.zeros((9, 1)), channels=(Channel("", "emg", "V"),))
-    with pytest.raises(MotionError, match="not those of its skeleton"):
+    with pytest.raises(MotionError, match="differ from those of its skeleton"):
         contacts(replace(markers("lfoot", np.zeros((9, 1, 3))), signals=(own,)))
 
 

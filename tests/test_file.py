@@ -217,12 +217,12 @@ def test_clips_that_nobody_has_are_let_go() -> None:
 
     from mcz.codecs import codec_by_name
     from mcz.container.writer import Writer
-    from mcz.files.reading.clips import KEPT
+    from mcz.files.reading.clips import KEPT_CLIPS
     from mcz.files.writing.clip_writer import write_clip
 
     out, motion = io.BytesIO(), smooth(3)
     writer = Writer(out)
-    for number in range(KEPT + 9):
+    for number in range(KEPT_CLIPS + 9):
         write_clip(writer, replace(motion, name=f"{number}"), codec_by_name("raw"), {})
     writer.finish()
     with mcz.open(out.getvalue()) as file:

@@ -230,7 +230,7 @@ def test_blocks_of_frames_hardly_show(monkeypatch: pytest.MonkeyPatch) -> None:
     points, markers = points_and_markers_of(skeleton, values)
     whole = solve_ik(skeleton, points, markers)
     monkeypatch.setattr("mcz.kinematics.inverse.BLOCK_NUMBERS", 1)
-    monkeypatch.setattr("mcz.kinematics.inverse.GUESSED", 7)
+    monkeypatch.setattr("mcz.kinematics.inverse.GUESS_BLOCK", 7)
     assert np.abs(solve_ik(skeleton, points, markers) - whole).max() < 1e-3
 
 

@@ -165,7 +165,7 @@ def test_the_same_faults_are_found(folder: Path, tmp_path: Path) -> None:
 
 
 def test_what_no_other_process_can_open_is_read_here(folder: Path) -> None:
-    with jobs.limited(2), (folder / "out.mcz").open("w+b") as stream:
+    with jobs.limit_jobs(2), (folder / "out.mcz").open("w+b") as stream:
         mcz.pack(folder / "z", stream)
         stream.seek(0)
         with mcz.open(stream) as file:

@@ -48,8 +48,8 @@ def test_names_that_one_has_alone_are_told(
     assert run("diff", amc, bvh) == 0
     text = capsys.readouterr().out
     assert "joints of the same name: mean" in text or "joint of the same name: mean" in text
-    assert f"joints of {amc} alone: root, " in text
-    assert f"joints of {bvh} alone: Hips, " in text
+    assert f"joints only in {amc}: root, " in text
+    assert f"joints only in {bvh}: Hips, " in text
 
 
 def test_like_skeletons_need_no_names(samples: Path, capsys: pytest.CaptureFixture[str]) -> None:

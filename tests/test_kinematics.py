@@ -279,7 +279,7 @@ def test_what_does_not_fit() -> None:
     with pytest.raises(MotionError, match="values of shape"):
         positions_of(walk.skeleton, walk.values[:, :5])
     own = Signal(walk.values, channels=walk.skeleton.channels)
-    with pytest.raises(MotionError, match="not those of its skeleton"):
+    with pytest.raises(MotionError, match="differ from those of its skeleton"):
         positions(replace(walk, signals=(own,)))
 
 

@@ -158,7 +158,7 @@ REFUSED = [
     ("a not 5", "column 7: expected in or like, not '5'"),
     ("a is 5", "column 6: expected missing or not missing, not '5'"),
     ("a is not not", "column 10: expected missing, not 'not'"),
-    ("5 is missing", "column 3: only what has a name can be missing"),
+    ("5 is missing", "column 3: only a name can be missing"),
     ("a < true", "column 3: true and false have no order '<'"),
     ("false >= a", "column 7: true and false have no order '>='"),
     ("a == 'b", "column 6: the text that begins with ' has no end"),
@@ -221,7 +221,7 @@ def test_a_query_can_be_pickled() -> None:
 
 
 def test_what_is_no_text() -> None:
-    with pytest.raises(OptionError, match="where: '5' is no text"):
+    with pytest.raises(OptionError, match="where: '5' is not a text"):
         Query(5)  # type: ignore[arg-type]
 
 

@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 import mcz
 from mcz.container.recovery import encoder
 from mcz.container.recovery.code import (
+    divide,
     encode_blocks,
     log_weights,
     logarithms,
-    over,
+    multiply,
     recover_blocks,
-    runs_of,
-    times,
+    run_length,
 )
 from mcz.container.recovery.layout import Shape, build_packet, read_packet, shape_for
 from mcz.container.source import ByteSource
@@ -36,12 +36,12 @@ TINY = bvh("1.5", "2.25")
 
 @given(ELEMENTS, ELEMENTS, ELEMENTS)
 def test_the_field_is_one(a: int, b: int, c: int) -> None:
-    assert times(a, b) == times(b, a) == by_hand(a, b)
-    assert times(a, times(b, c)) == times(times(a, b), c)
-    assert times(a, b ^ c) == times(a, b) ^ times(a, c)
-    assert times(a, 1) == a
+    assert multiply(a, b) == multiply(b, a) == by_hand(a, b)
+    assert multiply(a, multiply(b, c)) == multiply(multiply(a, b), c)
+    assert multiply(a, b ^ c) == multiply(a, b) ^ multiply(a, c)
+    assert multiply(a, 1) == a
     if b:
-        assert times(over(a, b), b) == a
+        assert multiply(divide(a, b), b) == a
 
 
 def by_hand(a: int, b: int) -> int:
@@ -66,14 +66,14 @@ def test_blocks_are_those_of_the_formula(n: int, m: int, seed: int) -> None:
     data = random.integers(-(2**63), 2**63 - 1, (n, 2))
     found = words(encode_blocks(lambda a, b: data[a:b], n, m, 2))
     exp, _ = logarithms()
-    size = runs_of(m)
+    size = run_length(m)
     weights = log_weights(np.arange(n), size)
     own = words(data)
     for i in range(m):
         row = np.zeros(own.shape[1], np.int64)
         for j in range(n):
-            factor = over(int(exp[weights[j]]), i ^ (size + j))
-            row ^= np.array([times(factor, int(word)) for word in own[j]])
+            factor = divide(int(exp[weights[j]]), i ^ (size + j))
+            row ^= np.array([multiply(factor, int(word)) for word in own[j]])
         np.testing.assert_array_equal(found[i], row)
 
 
@@ -234,7 +234,7 @@ def test_verify_finds_recovery_data_that_are_none(archive: bytes, shapes: list[S
     where = shape.chunk_offset + shape.chunk_size - 4
     bad[where : where + 4] = crc
     (problem,) = mcz.verify(bytes(bad))
-    assert "not that of its bytes" in problem.message
+    assert "does not match the protected bytes" in problem.message
     assert mcz.verify(bytes(bad), quick=True) == []
 
 

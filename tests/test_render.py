@@ -72,7 +72,7 @@ def test_the_floor_is_below_the_feet_and_all_is_seen(walk: Motion) -> None:
     for view in VIEWS:
         stage = stage_of(track, THEMES["light"], view, Viewport(10, 20, 300, 200), None, 15.0)
         for number, (_, nodes) in enumerate(track):
-            seen, _ = stage.camera_of(number).seen(nodes[track.body.shown])
+            seen, _ = stage.camera_of(number).project(nodes[track.body.shown])
             assert ((seen > (10, 20)) & (seen < (310, 220))).all()
             assert nodes[track.body.shown, 2].min() > track.floor - 0.05 * track.size
     assert track.unit == "cm"

@@ -429,7 +429,7 @@ def test_codecs_that_cannot_say_why() -> None:
         replace_values(write_bytes(smooth(20), "one"), "knee", np.zeros(20))
     with pytest.raises(OptionError, match="codec pca codes its channels in one group with"):
         replace_values(write_bytes(smooth(20), "pca"), "knee", np.zeros(20))
-    with pytest.raises(OptionError, match="overlap cannot code one joint anew"):
+    with pytest.raises(OptionError, match="overlap cannot encode one joint again"):
         replace_values(write_bytes(smooth(20), "overlap"), "knee", np.zeros(20))
     for codec in ("mrdwt", "qbc"):
         with pytest.raises(MotionError, match="not finite"):

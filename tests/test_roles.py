@@ -64,7 +64,7 @@ def test_roles_come_back_under_any_names() -> None:
     [
         ((beside([0, 1, 2, 3], role="motion"),), "not its first"),
         ((beside([0, 1, 2, 3], role="times"),) * 2, "two signals of times"),
-        ((beside([0, 1, 1, 0], role="times"),), "fall at frame 3"),
+        ((beside([0, 1, 1, 0], role="times"),), "decrease at frame 3"),
         ((beside([0, 1, np.nan, 3], role="times"),), "frame 2 is unknown"),
         ((beside([0, 1, 2, 3], "min", role="times"),), "unit 'min'"),
         ((beside([0, 1, 2, 3], role="residuals"),), "of is None"),

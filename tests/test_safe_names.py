@@ -64,7 +64,7 @@ def test_unpack_leaves_its_folder_with_no_names(
 ) -> None:
     archive = pack_names(tmp_path, "note.txt")
     for name in ("../out.txt", "/out.txt", "a/../../out.txt"):
-        stored = unpacking.Stored(name, "attachment", "note.txt")
+        stored = unpacking.StoredFile(name, "attachment", "note.txt")
         monkeypatch.setattr(unpacking, "files_of", lambda file, clips, one=stored: [one])
         report = mcz.unpack(archive, tmp_path / names, names=names)
         assert [o.result for o in report.outcomes] == ["failed"]

@@ -249,7 +249,7 @@ def test_bounds_have_units(unit: str, text: str, bound: float) -> None:
         ({"emg.max_error": "-1"}, "not a number and perhaps a unit"),
         ({"emg.max_error": "much"}, "not a number and perhaps a unit"),
         ({"emg.mean_error": "1.2.3V"}, "not a number and perhaps a unit"),
-        ({"analog.max_error": 1}, r"no signal 'analog' beside the motion; there are \['emg'\]"),
+        ({"analog.max_error": 1}, r"no signal 'analog' other than the motion; there are \['emg'\]"),
         ({"emg.most_error": 1}, "no parameter 'emg.most_error'"),
     ],
 )

@@ -100,8 +100,8 @@ def test_a_name_that_repeats_is_renamed_by_its_address() -> None:
         ({"LeftAm": "x"}, "no joint 'LeftAm' among .*did you mean 'LeftArm'"),
         ({"LeftArm": "RightArm"}, "'RightArm' would be the name of 2 joints: LeftArm, RightArm"),
         ({"LeftArm": "x", "RightArm": "x"}, "'x' would be the name of 2 joints"),
-        ({"LeftArm": ""}, "'' is no name for joint 'LeftArm'"),
-        ({"LeftArm": 3}, "3 is no name"),
+        ({"LeftArm": ""}, "'' is not a valid name for joint 'LeftArm'"),
+        ({"LeftArm": 3}, "3 is not a valid name"),
     ],
 )
 def test_names_that_cannot_be_are_refused(mapping: dict, reason: str) -> None:
@@ -247,7 +247,7 @@ def test_joints_that_cannot_be_chosen_are_refused(joints: object, reason: str) -
 
 def test_channels_that_are_no_joints_are_refused() -> None:
     signal = replace(smooth().signals[0], channels=(Channel("", "x"),) * 10)
-    with pytest.raises(MotionError, match="its channels are not those of its skeleton"):
+    with pytest.raises(MotionError, match="the channels of its motion signal differ"):
         mcz.select(replace(smooth(), signals=(signal,)), "hips")
 
 

@@ -17,7 +17,7 @@ from mcz import ChecksumError, OptionError
 from mcz.codecs import CODECS
 from mcz.codecs.contract import Layout
 from mcz.codecs.segments import Sizing, segments_by_guess
-from mcz.model.threads import in_force, in_order, limited
+from mcz.model.threads import limit_threads, map_in_order, thread_limit
 from tests.motions import smooth, write_bytes
 
 MOTION = smooth(1800)
@@ -67,15 +67,15 @@ def test_damage_is_found_where_it_is(threads: int) -> None:
 
 
 def test_how_many_threads_there_are() -> None:
-    usual = in_force()
+    usual = thread_limit()
     assert usual >= 1
-    with limited(3):
-        assert in_force() == 3
-        with limited(None):
-            assert in_force() == 3
-        with limited(1):
-            assert in_force() == 1
-    assert in_force() == usual
+    with limit_threads(3):
+        assert thread_limit() == 3
+        with limit_threads(None):
+            assert thread_limit() == 3
+        with limit_threads(1):
+            assert thread_limit() == 1
+    assert thread_limit() == usual
     with pytest.raises(OptionError, match="threads: 0"):
         mcz.open(b"", threads=0)
     with pytest.raises(OptionError, match="threads: -1"):
@@ -85,7 +85,7 @@ def test_how_many_threads_there_are() -> None:
 def test_few_results_wait() -> None:
     begun: list[int] = []
     before = threading.active_count()
-    results = in_order(lambda item: begun.append(item) or item, range(100), 3)
+    results = map_in_order(lambda item: begun.append(item) or item, range(100), 3)
     assert next(results) == 0
     assert len(begun) <= 5
     results.close()

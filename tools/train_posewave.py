@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.coding import mixing
 from mcz.codecs.posewave import choices, segment
-from mcz.codecs.posewave.header import parse_header
+from mcz.codecs.posewave.header import parse_posewave_header
 from mcz.codecs.posewave.model import N_SECOND, Start, start_of, start_tables
 from mcz.codecs.posewave.model_state import (
     C_LEVEL,
@@ -231,7 +231,7 @@ def levels_of(piece: Piece, steps: Sequence[float]) -> int:
     if middle not in piece.levels:
         params = {"step": step_of(piece.skeleton, middle), "levels": None}
         choice = choices.choose(piece, params)
-        piece.levels[middle] = parse_header(choice.header, piece.layout).levels
+        piece.levels[middle] = parse_posewave_header(choice.header, piece.layout).levels
     return piece.levels[middle]
 
 
@@ -246,7 +246,7 @@ def train(
         skeleton = piece.skeleton
         params = {"step": step_of(skeleton, step_cm), "levels": levels_of(piece, steps)}
         choice = choices.choose(piece, params)
-        header = replace(parse_header(choice.header, piece.layout), start=now.start)
+        header = replace(parse_posewave_header(choice.header, piece.layout), start=now.start)
         streams, _ = segment.encode_segment(header, skeleton, piece.frames, choice.weights)
         size += sum(map(len, streams))
         if len(counting.model.classes):

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.posewave import choices
-from mcz.codecs.posewave.header import Header, parse_header
-from mcz.codecs.posewave.model import SEEN, UNITS, VARIANCE, VARIANCE_UNITS, layout_of
+from mcz.codecs.posewave.header import Header, parse_posewave_header
+from mcz.codecs.posewave.model import PRIOR_ROWS, UNITS, VARIANCE, VARIANCE_UNITS, layout_of
 from mcz.codecs.posewave.orders import Orders
 from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import classes_of, encode_segment, kinds_of
@@ -90,7 +90,7 @@ def coarsest_rows(header: Header, skeleton: Skeleton, values: Floats) -> tuple[F
 def rows_of(piece: Piece) -> Iterator[tuple[Floats, Ints]]:
     for step in STEPS:
         params = {"step": step_of(piece.skeleton, step), "levels": None}
-        header = parse_header(choices.choose(piece, params).header, piece.layout)
+        header = parse_posewave_header(choices.choose(piece, params).header, piece.layout)
         yield coarsest_rows(header, piece.skeleton, piece.frames)
 
 
@@ -109,7 +109,7 @@ def train(name: str, files: Sequence[str]) -> dict[str, object]:
             covariance.add(rows, kept)
     assert layout is not None
     n = len(covariance.sums)
-    root = np.linalg.cholesky(VARIANCE * np.eye(n) + SEEN * covariance.mean())
+    root = np.linalg.cholesky(VARIANCE * np.eye(n) + PRIOR_ROWS * covariance.mean())
     own = np.diag(root)
     lower = np.clip(np.rint(root / own * UNITS), -127, 127)[np.tril_indices(n, -1)]
     digits = lower.astype(np.int8).tobytes().hex()

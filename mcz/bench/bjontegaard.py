@@ -17,7 +17,7 @@ FEWEST = 4  # points of a curve
 
 
 def front(curve: Curve) -> tuple[Values, Values]:
-    """Sizes and qualities of the points that no smaller one matches, both ascending.
+    """Sizes and qualities of the points that no smaller point matches, both ascending.
 
     >>> front([(20, 3.0), (10, 2.0), (30, 2.5)])
     (array([10., 20.]), array([2., 3.]))
@@ -30,7 +30,7 @@ def front(curve: Curve) -> tuple[Values, Values]:
 
 
 def bd_rate(reference: Curve, other: Curve) -> float | None:
-    """Percent of bytes that ``other`` needs more at equal quality; None where nothing is shared."""
+    """Percent of bytes that ``other`` needs more at equal quality; None without a common range."""
     a, b = front(reference), front(other)
     mean = _mean_difference((a[1], np.log10(a[0])), (b[1], np.log10(b[0])))
     return None if mean is None else float((10.0**mean - 1) * 100)
@@ -43,7 +43,7 @@ def bd_sqnr(reference: Curve, other: Curve) -> float | None:
 
 
 def _mean_difference(a: tuple[Values, Values], b: tuple[Values, Values]) -> float | None:
-    """The mean of y of ``b`` minus y of ``a`` over the x that both have."""
+    """The mean of y of ``b`` minus y of ``a`` over their common x."""
     if min(len(a[0]), len(b[0])) < FEWEST:
         return None
     low, high = max(a[0][0], b[0][0]), min(a[0][-1], b[0][-1])

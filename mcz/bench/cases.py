@@ -1,4 +1,4 @@
-"""The clips of a run, and what of them is coded how."""
+"""The clips of a run, and the variants of codecs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PUBLISHED = (
     "khan2014",
     "khan2016",
     "hou2016",
-)  # presets that follow a paper, looked for in every codec
+)  # presets that follow a paper, searched in every codec
 SUFFIXES = (".amc", ".bvh", ".c3d")
 
 
@@ -38,7 +38,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A case in memory; ``digest`` is that of all that its figures depend on."""
+    """A case in memory; ``digest`` covers all inputs of its figures."""
 
     motion: Motion
     data: bytes
@@ -57,7 +57,7 @@ def load(case: Case) -> Loaded:
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """A codec with the parameters that set it apart, its dial left free."""
+    """A codec with the parameters that define it, without its dial."""
 
     codec: str
     params: tuple[tuple[str, Any], ...] = ()
@@ -92,23 +92,25 @@ def preset_of(codec: str, preset: str) -> Variant:
 
 
 def variants_of(names: Sequence[str]) -> list[Variant]:
-    """Each codec as it is and with each published preset; all codecs where none is named.
+    """Each codec with its defaults and with each published preset; all codecs if none is named.
 
-    A name may be narrower: ``qbc:khan2014``, ``qbc:breaks=fewest`` is that alone. Raises
-    OptionError for what no codec has.
+    A narrower name selects one variant: ``qbc:khan2014``, ``qbc:breaks=fewest``. Raises OptionError
+    for an unknown name.
     """
-    found: list[Variant] = []
+    variants: list[Variant] = []
     for name in names or [codec.name for codec in CODECS.values()]:
         word, *settings = name.split(":")
         codec = codec_by_name(word)
         if settings:
             params = {k: _value(v) for k, v in (_pair(setting) for setting in settings)}
             codec.options(params)
-            found.append(Variant(word, tuple(params.items())))
+            variants.append(Variant(word, tuple(params.items())))
         else:
-            found.append(Variant(word))
-            found += [preset_of(word, preset) for preset in PUBLISHED if has_preset(codec, preset)]
-    return list(dict.fromkeys(found))
+            variants.append(Variant(word))
+            variants += [
+                preset_of(word, preset) for preset in PUBLISHED if has_preset(codec, preset)
+            ]
+    return list(dict.fromkeys(variants))
 
 
 def _pair(setting: str) -> tuple[str, str]:
@@ -126,10 +128,10 @@ def _value(text: str) -> Any:
 
 
 def find_cases(paths: Sequence[str], unit: str | None) -> list[Case]:
-    """The cases that files and folders stand for, each once.
+    """The cases of files and folders, each once.
 
-    Of a folder everything below it counts, .amc before .bvh before .c3d. Raises OptionError where
-    nothing is found.
+    Of a folder everything below it counts, .amc before .bvh before .c3d. Raises OptionError if
+    there is none.
     """
     cases: list[Case] = []
     for path in map(Path, paths):
@@ -142,12 +144,12 @@ def find_cases(paths: Sequence[str], unit: str | None) -> list[Case]:
     return list(dict.fromkeys(cases))
 
 
-def named(cases: Sequence[Case]) -> dict[str, Case]:
-    """Cases by name; of cases of one name all but the first by their path."""
-    found: dict[str, Case] = {}
+def cases_by_names(cases: Sequence[Case]) -> dict[str, Case]:
+    """Cases by name; the second and later ones of a name by their path."""
+    cases_by_name: dict[str, Case] = {}
     for case in cases:
-        found[case.path if case.name in found else case.name] = case
-    return found
+        cases_by_name[case.path if case.name in cases_by_name else case.name] = case
+    return cases_by_name
 
 
 def why(error: MczError) -> str:

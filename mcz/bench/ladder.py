@@ -7,23 +7,24 @@ from collections.abc import Callable
 from itertools import pairwise
 
 from mcz.bench.cases import Case, Variant, load
-from mcz.bench.measure import Record, coded_bytes, point
+from mcz.bench.measure import Record, coded_bytes, measure
 from mcz.codecs import codec_by_name
 from mcz.codecs.parameters import Dial
 from mcz.errors import MczError, MotionError, OptionError
 
-FINEST, COARSEST = 6, 150  # cr_float32 at the ends of a ladder, where the codec gets so far
+FINEST, COARSEST = 6, 150  # cr_float32 at the ends of a ladder, within the range of the codec
 N_POINTS = 10
-GROWTH = 4.0  # from one setting to the next while the ends are looked for
-FLAT, MOST_FLAT = 0.004, 6  # steps that change a size by so little, until the dial is taken to end
-CLEAR = 0.1  # a step that says which way sizes go
+GROWTH = 4.0  # from one setting to the next in the search for the ends
+# smallest relative change of size, and steps below it until the dial counts as ended
+FLAT, MOST_FLAT = 0.004, 6
+CLEAR = 0.1  # a step that shows the direction of sizes
 MOST_TRIALS = 24
 
 Known = dict[float, float]  # setting -> figure
 
 
 class Settings:
-    """The range of a dial: whole numbers only where the parameter wants them."""
+    """The range of a dial: whole numbers only for a parameter of integers."""
 
     def __init__(self, dial: Dial) -> None:
         self.low, self.high, self.whole = dial.low, dial.high, dial.whole
@@ -47,7 +48,7 @@ def dial_of(variant: Variant) -> tuple[Dial, Settings]:
 def sweep(case: Case, variant: Variant, n_points: int = N_POINTS) -> list[Record]:
     """Points of about evenly spaced sizes from fine to coarse; one point without a dial."""
     if codec_by_name(variant.codec).dial is None:
-        return [point(case, variant, {})]
+        return [measure(case, variant, {})]
     dial, settings = dial_of(variant)
     signal = load(case).motion.signals[0]
     plain = 4.0 * max(1, signal.values.size)
@@ -55,8 +56,8 @@ def sweep(case: Case, variant: Variant, n_points: int = N_POINTS) -> list[Record
     def size(setting: float) -> float:
         return coded_bytes(case, variant, {dial.parameter: settings.given(setting)})
 
-    found = ladder(size, settings, (plain / FINEST, plain / COARSEST), n_points)
-    return [point(case, variant, {dial.parameter: settings.given(s)}) for s in found]
+    points = ladder(size, settings, (plain / FINEST, plain / COARSEST), n_points)
+    return [measure(case, variant, {dial.parameter: settings.given(s)}) for s in points]
 
 
 def ladder(
@@ -64,8 +65,8 @@ def ladder(
 ) -> list[float]:
     """About ``n_points`` settings whose sizes are evenly spaced in logarithms, fine to coarse.
 
-    Sizes lie in ``window``, the greatest first, as far as the dial reaches. Which way the dial goes
-    is measured.
+    Sizes lie in ``window``, the greatest first, within the range of the dial. The direction of the
+    dial is measured.
     """
     big, small = window
     known = _explore(size, settings, big, small)
@@ -97,7 +98,7 @@ def _explore(size: Callable[[float], float], settings: Settings, big: float, sma
                 break
             try:
                 known[moved] = size(moved)
-            except MczError:  # the codec goes no further
+            except MczError:  # beyond the range of the codec
                 break
             change = math.log(known[moved] / before)
             flat = flat + 1 if abs(change) < FLAT else 0
@@ -129,7 +130,6 @@ def _widest(
 
 
 def _setting_at(known: Known, figure: float) -> float:
-    """The setting with this figure, on straight lines in logarithms."""
     for a, b in pairwise(sorted(known)):
         left, right = known[a], known[b]
         if min(left, right) <= figure <= max(left, right):

@@ -23,51 +23,49 @@ from mcz.model.types import JsonObject, Params
 
 Record = JsonObject
 
-LEAST_SECONDS = 0.25  # of CPU time that a speed is taken from, the fastest of its runs
+LEAST_SECONDS = 0.25  # runs are repeated for this much CPU time; the fastest counts
 MOST_RUNS = 50
-DROPPED = (
-    *("frames", "channels", "point_set", "points", "max_position_error_point"),
-    *("shell_radius_cm", "shell_max_joint", *NO_CONTACTS),
-)
+OMITTED = {"frames", "channels", "point_set", "points", "max_position_error_point"}
+OMITTED |= {"shell_radius_cm", "shell_max_joint", *NO_CONTACTS}
 
 
-def what_is_coded(motion: Motion, codec: str) -> Motion:
-    """All of the clip for a lossless codec, the motion alone for a lossy one."""
+def coded_part(motion: Motion, codec: str) -> Motion:
+    """All of the clip for a lossless codec, only the motion for a lossy one."""
     return motion if codec_by_name(codec).lossless else replace(motion, signals=motion.signals[:1])
 
 
 def write_file(motion: Motion, codec: str, params: Params) -> bytes:
-    """An MCZ file of one clip, without its quality record, which is no part of the codec."""
+    """An MCZ file of one clip, without its quality record, which is not part of the codec."""
     chosen = codec_by_name(codec)
     return file_in_memory(prepare(motion, chosen, params), chosen, params, BASE)
 
 
 def coded_bytes(case: Case, variant: Variant, params: Params) -> int:
-    """Payload and overhead, docs/reference/measures.md, and the models that the file has."""
-    motion = what_is_coded(load(case).motion, variant.codec)
+    """Bytes of payload, overhead and models, as docs/reference/measures.md defines them."""
+    motion = coded_part(load(case).motion, variant.codec)
     data = write_file(motion, variant.codec, variant.options(params))
     with mcz.open(data, max_decoded=2**53) as file:
         sizes = clip_sizes(file.container, file.only_clip())
     return sizes.payload + sizes.overhead + sizes.models
 
 
-def point(case: Case, variant: Variant, params: Params, *, markers: bool = True) -> Record:
-    """Sizes and errors of a clip at one setting, as the public reader has them."""
+def measure(case: Case, variant: Variant, params: Params, *, markers: bool = True) -> Record:
+    """Sizes and errors of a clip at one setting, from the public reader."""
     whole = load(case).motion
-    motion = what_is_coded(whole, variant.codec)
+    motion = coded_part(whole, variant.codec)
     data = write_file(motion, variant.codec, variant.options(params))
     with mcz.open(data, max_decoded=2**53) as file:
         clip = file.only_clip()
         sizes, ratios = clip_sizes(file.container, clip), clip_ratios(file, clip)
         radius = SHELL_CM if markers else None
-        found = mcz.compare(motion, clip.motion(), virtual_markers=markers, shell_cm=radius)
+        figures = mcz.compare(motion, clip.motion(), virtual_markers=markers, shell_cm=radius)
     coded = sizes.payload + sizes.overhead + sizes.models
     if not codec_by_name(variant.codec).lossless:
         ratios = _ratios(motion, len(load(case).data), coded)
     ratios.pop("cr_file", None)
     if len(motion.signals) < len(whole.signals):
-        ratios["cr_source"] = None  # its bytes are of signals, too, that are not coded here
-    entries = {k: v for k, v in found.entries().items() if k not in DROPPED}
+        ratios["cr_source"] = None  # the source also holds signals that are not coded here
+    entries = {k: v for k, v in figures.entries().items() if k not in OMITTED}
     return {
         "params": dict(params),
         "coded_bytes": coded,
@@ -78,7 +76,7 @@ def point(case: Case, variant: Variant, params: Params, *, markers: bool = True)
 
 
 def _ratios(motion: Motion, source_bytes: int, coded: int) -> dict[str, float | None]:
-    """Ratios with the numerators of the clip itself, whatever domain its codec has."""
+    """Ratios with the numerators of the clip itself, whatever its codec stores."""
     per_joint = 40 * motion.n_frames * motion.skeleton.n_joints
     numerators = (source_bytes, 4 * motion.signals[0].values.size, per_joint)
     names = ("cr_source", "cr_float32", "cr_40B")
@@ -86,7 +84,7 @@ def _ratios(motion: Motion, source_bytes: int, coded: int) -> dict[str, float | 
 
 
 def cpu_seconds(work: Callable[[], object]) -> float:
-    """CPU time of the fastest of several runs, the first of which (compilation) does not count."""
+    """CPU time of the fastest of several runs, after a first one that compiles."""
     work()
     spent, best = 0.0, float("inf")
     for _ in range(MOST_RUNS):
@@ -100,7 +98,7 @@ def cpu_seconds(work: Callable[[], object]) -> float:
 
 
 def peak_bytes(work: Callable[[], object]) -> int:
-    """The most memory that Python and numpy held while it ran, beside what they had before."""
+    """The most memory that Python and numpy held during a call, above what they held before."""
     tracemalloc.start()
     try:
         work()
@@ -112,12 +110,12 @@ def peak_bytes(work: Callable[[], object]) -> int:
 def speeds(case: Case, variant: Variant, params: Params) -> Record:
     """Frames a second, warm, of the codec alone, of writing and reading files, of parsing text.
 
-    Peak memory is that of the codec alone, beside the values themselves.
+    Peak memory is the codec's own, without the values themselves.
     """
     loaded = load(case)
-    motion = what_is_coded(loaded.motion, variant.codec)
+    motion = coded_part(loaded.motion, variant.codec)
     given = variant.options(params)
-    encode, decode = work_of(motion, variant.codec, given)
+    encode, decode = codec_calls(motion, variant.codec, given)
 
     def read() -> object:
         with mcz.open(data, max_decoded=2**53) as file:
@@ -141,16 +139,16 @@ def speeds(case: Case, variant: Variant, params: Params) -> Record:
     return {"params": dict(params), **fps, **ratios, **memory}
 
 
-def work_of(
+def codec_calls(
     motion: Motion, name: str, params: Params
 ) -> tuple[Callable[[], object], Callable[[], object]]:
-    """Encoding and decoding by the codec alone, of values in the domain that it wants."""
+    """Encoding and decoding by the codec alone, of the values that it stores."""
     codec = codec_by_name(name)
     options = codec.options(params)
-    wanted = prepare(motion, codec, params).motion
+    stored_motion = prepare(motion, codec, params).motion
 
     def encode() -> tuple[Encoded, list[Segment]]:
-        source = MemorySource(wanted, 0, codec, BASE.segment_bytes, options)
+        source = MemorySource(stored_motion, 0, codec, BASE.segment_bytes, options)
         encoded = codec.encode(source, options)
         return encoded, list(encoded.segments)
 
@@ -158,7 +156,7 @@ def work_of(
     find_model = model_finder((*encoded.models, *encoded.known))
 
     def decode() -> None:
-        layout = MemorySource(wanted, 0, codec, BASE.segment_bytes, options).layout
+        layout = MemorySource(stored_motion, 0, codec, BASE.segment_bytes, options).layout
         layout = replace(layout, n_resolutions=encoded.n_resolutions, find_model=find_model)
         spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
         n = len(layout.groups)

@@ -1,7 +1,7 @@
-"""General compressors on the same clips: those that are installed, and what of the clip they code.
+"""General compressors on the same clips: the installed ones, and their inputs.
 
-Extra ``bench`` in pyproject.toml brings them. None of them gives a motion file back from the
-matrix: text, skeleton and spelling would come on top.
+Extra ``bench`` in pyproject.toml installs them. None of them restores a motion file from the
+matrix: text, skeleton and spelling would be added.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ def installed() -> tuple[str, ...]:
 
 
 def missing() -> list[str]:
-    """The peers that cannot, by the name of what would have to be installed."""
+    """The peers that cannot run, by the name of the missing package."""
     return [module for name, module in MODULES.items() if name not in installed()]
 
 
 def measure(loaded: Loaded) -> list[Record]:
-    """One record a peer and what it codes; zfp also with bounds on the error of a value."""
+    """One record a peer and input; zfp also with bounds on the error of a value."""
     motion = loaded.motion
     values = np.asarray(motion.signals[0].masked(), np.float64)
     if motion.signals[0].has_poses:
@@ -96,7 +96,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """A compressor, and what of the clip it codes."""
+    """A compressor, and its input."""
 
     name: str
     what: str
@@ -147,7 +147,6 @@ def _npy(matrix: NDArray[np.float64]) -> bytes:
 
 
 def _pcodec(columns: NDArray[np.generic]) -> bytes:
-    """Streams of columns, each behind its size of four bytes."""
     standalone = import_module("pcodec").standalone
     config = import_module("pcodec").ChunkConfig(compression_level=8)
     columns = np.ascontiguousarray(columns)
@@ -170,15 +169,15 @@ def _blosc2(matrix: NDArray[np.generic]) -> bytes:
 
 
 def _bounded(loaded: Loaded, matrix: Matrix) -> Iterator[Record]:
-    """zfp with a bound on the error of a value, and what that does to the motion."""
+    """zfp with a bound on the error of a value, and the resulting errors of the motion."""
     zfpy = import_module("zfpy")
     motion = loaded.motion
     for tolerance in TOLERANCES:
         data = zfpy.compress_numpy(matrix, tolerance=tolerance)
         values = np.asarray(zfpy.decompress_numpy(data), np.float64)
-        found = mcz.compare(motion, motion.with_values(values)).entries()
+        figures = mcz.compare(motion, motion.with_values(values)).entries()
         what = f"{MATRIX}, error of a value at most {tolerance:g}"
         keys = ("mse", "rms_coordinate_error", "mean_position_error", "sqnr_db")
         more = ("mean_position_error_cm", "max_position_error_cm", "virtual_marker_mean_cm")
         record = _record(loaded, "zfp, tolerance", what, len(data))
-        yield record | {"params": {"tolerance": tolerance}} | {k: found[k] for k in keys + more}
+        yield record | {"params": {"tolerance": tolerance}} | {k: figures[k] for k in keys + more}

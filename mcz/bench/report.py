@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import mcz
 from mcz.bench import peers, sweep
-from mcz.bench.cases import find_cases, named, variants_of
+from mcz.bench.cases import cases_by_names, find_cases, variants_of
 from mcz.bench.sweep import ClipResult, Curve
 from mcz.bench.tables import Table
 from mcz.bench.tasks import Runner
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
 
-Figures = Callable[[Path], Iterator[Path]]  # draws into a folder, says what it drew
+Figures = Callable[[Path], Iterator[Path]]  # draws into a folder, yields the paths
 
 MISSING = "no plots: matplotlib is not installed (pip install 'mcz[plot]')"
 MARKS = "osD^vP*X<>"
@@ -34,8 +34,8 @@ PUBLISHED = (0, (4, 2))  # dashes of presets that follow a paper
 PEER = (0, (1, 1.5))
 LINES = ("blue", "orange", "green", "red", "purple", "brown", "pink", "gray", "olive", "cyan")
 BRIGHTER = 0.3  # of the way to white, lines on dark ground
-LONG = 3.2  # decades of an axis
-MOST_WIDE = 2  # times the greatest size of our codecs: how far to the right a peer is drawn
+LONG_AXIS = 3.2  # decades of an axis
+MOST_WIDE = 2  # times the greatest size of our codecs: right edge for peers
 
 
 def can_draw() -> bool:
@@ -51,7 +51,7 @@ def draw_all(figures: Iterable[Figures], folder: Path, theme: str) -> list[Path]
 
 
 def _colors(theme: Theme) -> Any:
-    """Settings of matplotlib: ten colors of lines, brighter where the ground is dark."""
+    """Settings of matplotlib: ten colors of lines, brighter on a dark ground."""
     from cycler import cycler
     from matplotlib.colors import to_rgb
 
@@ -74,7 +74,7 @@ def draw(clips: Sequence[ClipResult], folder: Path) -> Iterator[Path]:
         if not clip.lossy:
             continue
         path = folder / f"{_plain(clip.name)}.png"
-        _draw(clip, clip.drawn, path, clip.name)
+        _draw(clip, clip.plotted_curves, path, clip.name)
         yield path
         names = list(dict.fromkeys(c.variant.codec for c in clip.lossy if c.variant))
         for name in names:
@@ -167,11 +167,11 @@ def _panel(
 
 
 def plain_ticks(axis: Axis) -> None:
-    """Marks at 1, 2 and 5, or of a long range at 1, of a logarithmic axis as plain numbers."""
+    """Marks at 1, 2 and 5, on a long range at 1, of a logarithmic axis as plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()
-    long = low > 0 and math.log10(high / low) > LONG
+    long = low > 0 and math.log10(high / low) > LONG_AXIS
     axis.set_major_locator(LogLocator(subs=(1.0,) if long else (1.0, 2.0, 5.0), numticks=30))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.12g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -184,7 +184,6 @@ def _safe(x: Any) -> Any:
 
 
 def _label_points(axes: Axes, curve: Curve, key: str, published: bool) -> None:
-    """The setting beside every point."""
     for point in curve.points:
         if point.get(key) and point["params"]:
             value = next(iter(point["params"].values()))
@@ -253,9 +252,9 @@ def bench(
 ) -> Outcome:
     """Measure the clips of ``paths``; raises OptionError for an unknown codec or no clip at all."""
     variants = variants_of(codecs)
-    cases = named(find_cases(paths, unit))
+    cases = cases_by_names(find_cases(paths, unit))
     asked = peers.installed() if with_peers else ()
-    clips = sweep.measured(runner, cases, variants, speeds=speeds, peers=asked)
+    clips = sweep.measure_all(runner, cases, variants, speeds=speeds, peers=asked)
     outcome = Outcome(clips, figures=[partial(draw, clips)])
     for clip in clips:
         outcome.tables.extend(sweep.tables(clip))

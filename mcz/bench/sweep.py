@@ -26,7 +26,7 @@ AT_RATIOS = (20.0, 40.0, 60.0, 80.0, 120.0)
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """The points of one codec on one clip, fine to coarse, its speeds, or why there are none."""
+    """The points of one codec on one clip, fine to coarse, its speeds, or the reason for none."""
 
     label: str
     points: tuple[Record, ...] = ()
@@ -80,21 +80,21 @@ class ClipResult:
         return [c for c in self.curves if c.points and not c.lossless]
 
     @property
-    def drawn(self) -> list[Curve]:
-        """Lossy codecs, and zfp with bounds where it ran."""
+    def plotted_curves(self) -> list[Curve]:
+        """Lossy codecs, and zfp with bounds if it ran."""
         bounded = tuple(p for p in self.peers if p["peer"] == ZFP)
         return [*self.lossy, *([Curve(ZFP, bounded)] if bounded else [])]
 
     def deltas(self) -> list[JsonObject]:
         """Bjontegaard deltas of every codec against every other."""
-        found = []
+        entries = []
         for a in self.lossy:
             for b in self.lossy:
                 if a is not b:
                     pair = a.pairs("sqnr_db"), b.pairs("sqnr_db")
                     row = {"reference": a.label, "other": b.label, "bd_rate_pct": bd_rate(*pair)}
-                    found.append(row | {"bd_sqnr_db": bd_sqnr(*pair)})
-        return found
+                    entries.append(row | {"bd_sqnr_db": bd_sqnr(*pair)})
+        return entries
 
     def document(self) -> JsonObject:
         return {
@@ -110,7 +110,7 @@ class ClipResult:
         }
 
 
-def measured(
+def measure_all(
     runner: Runner,
     cases: Mapping[str, Case],
     variants: Sequence[Variant],
@@ -118,7 +118,7 @@ def measured(
     speeds: bool,
     peers: tuple[str, ...],
 ) -> list[ClipResult]:
-    """Everything, clip by clip: sizes and errors first, then speeds with nothing beside them."""
+    """All results, clip by clip: sizes and errors first, then speeds with no other task running."""
     tasks = [Task("sweep", c, v, (N_POINTS,)) for c in cases.values() for v in variants]
     swept = runner.run(tasks)
     timed = {}
@@ -128,15 +128,15 @@ def measured(
             params = points[len(points) // 2]["params"]
             timed[task] = Task("speeds", task.case, task.variant, tuple(params.items()))
     asked = {case: Task("peers", case, arguments=peers) for case in cases.values() if peers}
-    found = runner.run([*timed.values(), *asked.values()])
+    outcomes = runner.run([*timed.values(), *asked.values()])
     results = []
     for name, case in cases.items():
         curves = []
         for task in tasks:
             if task.case == case:
-                speed = found.get(timed[task], {}) if task in timed else {}
+                speed = outcomes.get(timed[task], {}) if task in timed else {}
                 curves.append(_curve(task.variant, swept[task], speed))
-        others = found[asked[case]] if case in asked else []
+        others = outcomes[asked[case]] if case in asked else []
         loaded = load(case)
         motion = loaded.motion
         facts = (len(loaded.data), motion.n_frames, motion.signals[0].n_channels)
@@ -205,12 +205,12 @@ def _points(clip: ClipResult) -> Table:
     return table
 
 
-def at_error(curve: Curve, key: str, wanted: float) -> float | None:
-    """Bytes at which the figure ``key`` is ``wanted``: straight in logarithms between points."""
+def at_error(curve: Curve, key: str, figure: float) -> float | None:
+    """Bytes at which ``key`` equals ``figure``: straight in logarithms between points."""
     sizes, errors = _front(curve, key)
-    if len(sizes) < 2 or not errors[-1] <= wanted <= errors[0]:
+    if len(sizes) < 2 or not errors[-1] <= figure <= errors[0]:
         return None
-    where = np.interp(math.log(wanted), np.log(errors[::-1]), np.log(sizes[::-1]))
+    where = np.interp(math.log(figure), np.log(errors[::-1]), np.log(sizes[::-1]))
     return float(math.exp(where))
 
 
@@ -223,7 +223,7 @@ def at_size(curve: Curve, key: str, size: float) -> float | None:
 
 
 def _front(curve: Curve, key: str) -> tuple[Any, Any]:
-    """Sizes ascending and errors descending of the points that no smaller one matches."""
+    """Sizes ascending and errors descending of the points that no smaller point matches."""
     sizes, negative = front((size, -error) for size, error in curve.pairs(key))
     return sizes, -negative
 
@@ -237,26 +237,26 @@ def _at_equal(clip: ClipResult) -> Iterator[Table]:
     caption = f"{_about(clip)}. {clip.error_key} in {clip.unit} at cr_source of, {BETWEEN}."
     heads = tuple((f"CR {value:g}", ".4f") for value in AT_RATIOS)
     table = Table(f"{clip.name}: position error at equal size", caption, (("codec", ""), *heads))
-    for curve in clip.drawn:
+    for curve in clip.plotted_curves:
         sizes = (clip.source_bytes / ratio for ratio in AT_RATIOS)
         errors = (at_size(curve, clip.error_key, size) for size in sizes)
         table.rows.append((curve.label, *errors))
     yield table
 
 
-def _at_error(clip: ClipResult, title: str, key: str, wanted: Sequence[float], unit: str) -> Table:
+def _at_error(clip: ClipResult, title: str, key: str, errors: Sequence[float], unit: str) -> Table:
     where = f"{key} in {unit}" if unit else key
     caption = f"{_about(clip)}. cr_source at {where} of, {BETWEEN}."
-    heads = tuple((f"{value:g} {unit}".strip(), ".1f") for value in wanted)
+    heads = tuple((f"{value:g} {unit}".strip(), ".1f") for value in errors)
     table = Table(f"{clip.name}: CR at equal {title}", caption, (("codec", ""), *heads))
-    for curve in clip.drawn:
-        sizes = (at_error(curve, key, value) for value in wanted)
+    for curve in clip.plotted_curves:
+        sizes = (at_error(curve, key, value) for value in errors)
         table.rows.append((curve.label, *(clip.source_bytes / s if s else None for s in sizes)))
     return table
 
 
 def _delta_tables(clip: ClipResult) -> Iterator[Table]:
-    found = {(d["reference"], d["other"]): d for d in clip.deltas()}
+    deltas = {(d["reference"], d["other"]): d for d in clip.deltas()}
     labels = [curve.label for curve in clip.lossy]
     for title, key, unit in (
         ("Bjontegaard delta rate", "bd_rate_pct", "percent of bytes, below 0 is better"),
@@ -266,7 +266,7 @@ def _delta_tables(clip: ClipResult) -> Iterator[Table]:
         heads = tuple((label, ".2f") for label in labels)
         table = Table(f"{clip.name}: {title}", caption, (("codec", ""), *heads))
         for row in labels:
-            cells = (found.get((column, row), {}).get(key) for column in labels)
+            cells = (deltas.get((column, row), {}).get(key) for column in labels)
             table.rows.append((row, *cells))
         yield table
 

@@ -1,4 +1,4 @@
-"""Tables as data, and as people read them."""
+"""Tables as data, and as text."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ Cell = float | int | str | None
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of raw values; the caption says clip, numerator, metric and unit.
+    """Rows of raw values; the caption has clip, numerator, metric and unit.
 
-    ``columns`` are pairs of heading and format; a format is that of ``format()``, "" for text.
+    ``columns`` are pairs of heading and format; a format is as for ``format()``, "" for text.
     """
 
     title: str

@@ -1,8 +1,8 @@
-"""Work as tasks that run in processes of their own; results come from the cache where it has them.
+"""Work as tasks that run in separate processes, with a cache of results.
 
-A task names its kind and has plain arguments, so that it travels between processes and makes a
-key. What a kind does says a table that the runner is given: ``KINDS``, or one that others build
-upon it. Speeds and memory are measured one task at a time, with nothing else of ours running.
+A task has a kind and plain arguments, so that it can be sent between processes and hashed to a key.
+A table of kinds, which the runner is given, has the functions: ``KINDS``, or an extension of it.
+Speeds and memory are measured one task at a time, with no other task running.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ THREADS = (
     *("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"),
     "VECLIB_MAXIMUM_THREADS",
 )
-NONE = Variant("")  # of tasks that are about no codec
+NONE = Variant("")  # of tasks without a codec
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """``kind`` is a row of the runner's table; ``arguments`` are those behind case and variant."""
+    """``kind`` is a row of the runner's table; ``arguments`` follow case and variant."""
 
     kind: str
     case: Case
@@ -56,7 +56,7 @@ def _sweep(task: Task) -> Any:
 
 
 def _point(task: Task) -> Any:
-    return measure.point(task.case, task.variant, dict(task.arguments))
+    return measure.measure(task.case, task.variant, dict(task.arguments))
 
 
 def _speeds(task: Task) -> Any:
@@ -69,9 +69,9 @@ def _peers(task: Task) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of task; ``alone``: nothing else of ours runs beside it.
+    """A kind of task; ``alone``: no other task runs at the same time.
 
-    ``work`` is a function of a module, for it travels to other processes by its name.
+    ``work`` is a function of a module, since other processes get it by name.
     """
 
     work: Callable[[Task], Any]
@@ -90,14 +90,15 @@ def perform(task: Task, kind: Kind) -> Any:
     """The result of a task; ``{"error": ...}`` where the clip or a parameter is refused."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SkeletonWarning)  # said where the key was made
+            # already given when the key was computed
+            warnings.simplefilter("ignore", SkeletonWarning)
             return kind.work(task)
     except MczError as error:
         return {"error": why(error)}
 
 
 def key_of(task: Task) -> str:
-    """Cache key: all that the result depends on, the package itself apart."""
+    """Cache key: all inputs of the result, except the package itself."""
     codec = codec_by_name(task.variant.codec) if task.variant.codec else None
     return json.dumps(
         [
@@ -112,9 +113,9 @@ def key_of(task: Task) -> str:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Processes that start meanwhile multiply matrices in one thread.
+    """Limit processes started in the block to one thread of matrix products.
 
-    CPU time is that of all threads, and those of BLAS wait for each other by running.
+    CPU time counts all threads, and threads of BLAS wait for each other by running.
     """
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
@@ -129,7 +130,7 @@ def _one_thread() -> Iterator[None]:
 
 
 class Runner:
-    """Runs tasks of ``kinds`` in ``jobs`` processes; one of them means this one, speeds apart."""
+    """Runs tasks of ``kinds`` in ``jobs`` processes; 1 means this process, except for speeds."""
 
     def __init__(
         self,
@@ -143,23 +144,23 @@ class Runner:
         self.n_cached = self.n_run = 0
 
     def run(self, tasks: Iterable[Task]) -> dict[Task, Any]:
-        """Results by task, those that share a clip one after the other."""
-        wanted = sorted(
+        """Results by task; tasks that share a clip run one after the other."""
+        pending = sorted(
             dict.fromkeys(tasks), key=lambda task: (self.kinds[task.kind].alone, task.case.path)
         )
         results: dict[Task, Any] = {}
         missing = []
-        for task in wanted:
-            found = self.cache.get(key_of(task))
-            if found is None:
+        for task in pending:
+            result = self.cache.get(key_of(task))
+            if result is None:
                 missing.append(task)
             else:
-                results[task] = found
+                results[task] = result
         self.n_cached += len(results)
         self.n_run += len(missing)
         alone = [task for task in missing if self.kinds[task.kind].alone]
         for part, jobs in ((missing[: len(missing) - len(alone)], self.jobs), (alone, 1)):
-            self._run_part(part, jobs, results, len(wanted))
+            self._run_part(part, jobs, results, len(pending))
         return results
 
     def _run_part(
@@ -200,12 +201,12 @@ class Runner:
         self.cache.put(key_of(task), result)
 
 
-# Of this part; of cli/ no measured figure depends on any file.
+# Of this folder; no measured figure depends on a file of cli/.
 MEASURING = ("cases.py", "ladder.py", "measure.py", "peers.py", "tasks.py")
 
 
 def default_folder() -> Path:
-    """Below the user's cache folder; RuntimeError where there is no home."""
+    """Below the user's cache folder; RuntimeError without a home."""
     home = Path.home()
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or str(home / "AppData" / "Local")
@@ -229,9 +230,9 @@ def code_digest() -> str:
 
 
 class Cache:
-    """Results as JSON files named by the hash of their key; without a folder nothing is kept.
+    """Results as JSON files named by the hash of their key; without a folder no result is kept.
 
-    ``code`` are files that results depend on beside those of the package.
+    ``code`` are files that results depend on besides the files of the package.
     """
 
     def __init__(self, folder: Path | None, code: Iterable[Path] = ()) -> None:
@@ -251,13 +252,13 @@ class Cache:
         if self.folder is None:
             return None
         try:
-            held = json.loads(self._path(key).read_text("utf-8"))
+            entry = json.loads(self._path(key).read_text("utf-8"))
         except (OSError, ValueError):
             return None
-        return held.get("result") if isinstance(held, dict) else None
+        return entry.get("result") if isinstance(entry, dict) else None
 
     def put(self, key: str, result: object) -> None:
-        """Keep ``result``; a folder that takes nothing is no error."""
+        """Store ``result``; a folder that is not writable is not an error."""
         if self.folder is None:
             return
         path = self._path(key)

@@ -3,5 +3,5 @@
 ``main`` has the table of commands, which are imported when they run. ``options`` has the options
 that commands share, ``common`` the exit codes, ``hints`` the words of hints.
 
-Imports every room.
+Imports every folder.
 """

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from mcz.files.editing.batch_report import Outcome, Report
 
 
-HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "written", *GIVEN_BACK)
-MANY = 50  # files of one kind that are named for one reason; --json names all
+STORED_RESULTS = ("parsed", "skeleton", "alias", "verbatim", "present", "written", *GIVEN_BACK)
+MANY = 50  # files of one kind and reason that are named; --json names all
 
 
 def _table(report: Report) -> Iterator[str]:
-    """Results by kind of file; empty where there is only one kind."""
+    """Results by kind of file; empty for a single kind."""
     kinds: dict[str, list[Outcome]] = {}
     for outcome in report.outcomes:
         kinds.setdefault(PurePosixPath(outcome.path).suffix.lower() or "-", []).append(outcome)
@@ -38,7 +38,7 @@ def _summary(report: Report) -> str:
     """Counts of results, and the bytes of the sources and of the MCZ file."""
     counts = Counter(outcome.result for outcome in report.outcomes)
     shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
-    kept = [outcome for outcome in report.outcomes if outcome.result in HELD]
+    kept = [outcome for outcome in report.outcomes if outcome.result in STORED_RESULTS]
     size = sum(outcome.size for outcome in kept)
     files = plural(len(report.outcomes), "file") + (f" ({shown})" if shown else "")
     if report.size is None:
@@ -114,14 +114,14 @@ def print_file_results(report: Report, target: str, as_json: bool) -> Exit:
     for line in report.damage:
         say(f"salvage: {line}")
     damaged = report.count("damaged")
-    if damaged and damaged == len(report.outcomes):  # nothing is whole
+    if damaged and damaged == len(report.outcomes):  # no file is intact
         return Exit.BAD_INPUT
     lost = report.damage or report.count("salvaged") or damaged
     return Exit.SALVAGED if lost else Exit.FINE
 
 
 def print_clip_results(report: Report, target: str, as_json: bool, listed: tuple[str, ...]) -> Exit:
-    """Print the results of clips, each clip whose result is ``listed`` on its own line."""
+    """Print the results of clips, each clip with a ``listed`` result on its own line."""
     counts = Counter(outcome.result for outcome in report.outcomes)
     if as_json:
         rows = [{"name": o.path, "result": o.result, "message": o.message} for o in report.outcomes]

@@ -32,7 +32,7 @@ PAPERS = "python -m tools.papers"
     help="Compare these codecs, each with its presets; qbc:khan2014 or qbc:delta=40 is that "
     "alone. Default: all.",
 )
-@click.option("--tables", "paper", hidden=True)  # where the papers' tables are is said
+@click.option("--tables", "paper", hidden=True)  # an internal option of tools/papers
 @click.option("--peers", is_flag=True, help="Add the general compressors that are installed.")
 @click.option("--speeds/--no-speeds", default=True, help="Also measure speed and memory (default).")
 @unit_option("files that state none")
@@ -96,7 +96,7 @@ def bench_command(
 
 
 def show(outcome: Outcome, out: Path | None, *, as_json: bool) -> None:
-    """Print what was found, and write the files of a report where ``out`` is given."""
+    """Print the results, and write the files of a report if ``out`` is given."""
     document = outcome.document() | {"files": _write(outcome, out) if out else []}
     if as_json:
         print_json(document)
@@ -110,7 +110,6 @@ def show(outcome: Outcome, out: Path | None, *, as_json: bool) -> None:
 
 
 def _sample(folder: str) -> str:
-    """The walk that this package makes itself."""
     from mcz.sources.sample import write_samples
 
     write_samples(Path(folder))
@@ -126,7 +125,6 @@ def _lines(outcome: Outcome) -> Iterator[str]:
 
 
 def _write(outcome: Outcome, folder: Path) -> list[str]:
-    """Write the files of a report; return their paths."""
     from mcz.bench.report import MISSING, can_draw, draw_all
 
     try:

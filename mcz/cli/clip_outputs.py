@@ -94,7 +94,7 @@ def _source_output(clip: Clip, part: ClipSelection) -> Output:
 
 
 def _refuse_positions(clip: Clip) -> None:
-    """Raise Failure for positions whose skeleton is in the file: it can be fitted to them."""
+    """Raise Failure for positions whose skeleton is in the file and can be fitted to them."""
     from mcz.kinematics import point_set
 
     if clip.skeleton.base and point_set(clip.skeleton) == "markers":
@@ -124,7 +124,7 @@ def _converted_output(clip: Clip | Motion, suffix: str, data: bytes) -> Output:
 def _convert(
     motion: Motion, target: str, rate: Fraction | None, with_skeleton: bool
 ) -> list[Output]:
-    """The motion as a plain file of another format, with its ASF where an AMC is to have one."""
+    """The motion as a plain file of another format, with its ASF for an AMC."""
     from mcz.exchange.conversion import converted_files
 
     files = converted_files(motion, target, rate, with_skeleton)
@@ -146,7 +146,7 @@ def _export(clip: Clip, target: str, part: ClipSelection, options: DecodeOptions
         units = channel_units(clip.skeleton, channels)
         table = part.of_signal(signal, options.stored, names, units)
         return _converted_output(clip, target, EXPORTS[target](table))
-    if chosen is not None and channels is None:  # else the table says why there are no joints
+    if chosen is not None and channels is None:  # else the table explains why there are no joints
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
     table = part.table(chosen, names)
@@ -174,7 +174,7 @@ def _stem(clip: Clip | Motion) -> str:
 
 
 def _skeleton_id(file: File, clip: Clip) -> bytes:
-    """The skeleton of the clip, or its base where that alone has a file of its own."""
+    """The skeleton of the clip, or its base if only that has a file of its own."""
     base = clip.base_skeleton
     own = file.skeleton(clip.skeleton_id, with_source=True).source
     has_file = own is None and base is not None and base.source is not None
@@ -182,7 +182,7 @@ def _skeleton_id(file: File, clip: Clip) -> bytes:
 
 
 def skeleton_output(file: File, skeleton_id: bytes) -> Output:
-    """The skeleton's own file; its name is that of the alias that refers to it."""
+    """The skeleton's own file, named by the alias that refers to it."""
     names = (name for name, (_, target) in file.aliases.items() if target == skeleton_id)
     name = PurePosixPath(next(names, "skeleton.asf")).name
     return Output("skeleton", name, file.skeleton_bytes(skeleton_id), RESTORED)
@@ -191,8 +191,7 @@ def skeleton_output(file: File, skeleton_id: bytes) -> Output:
 def summary_facts(clips: Mapping[str, ConversionSummary]) -> JsonObject:
     """The ``--json`` facts: "fit" and "scene" of one clip, "fits" and "scenes" by name of several.
 
-    "left_out" has by the names of clips what their formats have no place for, "notes" what else is
-    to be known of them.
+    "left_out" lists by clip what the formats cannot hold, "notes" other remarks.
     """
     fits = {name: _fit(clip.fit) for name, clip in clips.items() if clip.fit is not None}
     scenes = {name: _scene(clip.scene) for name, clip in clips.items() if clip.scene is not None}
@@ -276,7 +275,7 @@ def _fit_line(fit: Fit) -> str:
 
 
 def _rate_notes(clip: Clip, part: ClipSelection, options: DecodeOptions) -> tuple[str, ...]:
-    """Notes on text files whose stated times differ from those of the clip."""
+    """Notes on text files whose stated times differ from the clip's."""
     from mcz.files.reading.rate_notes import text_notes
 
     if options.decimate:

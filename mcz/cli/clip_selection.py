@@ -1,4 +1,4 @@
-"""Parts of a clip as ``mcz decode`` writes them: a source file, a motion or a table."""
+"""Parts of a clip, written by ``mcz decode``: a source file, a motion or a table."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ClipSelection:
         return self.clip.source_bytes(self.frames, self.resolution, decimate=self.decimate)
 
     def fidelity(self, data: bytes) -> str:
-        """A word for how near its ``source_bytes``, ``data``, are to the source file."""
+        """A word for the fidelity of its ``source_bytes``, ``data``, to the source file."""
         whole, source = fidelity_of(self.clip), self.clip.source
         if whole == LOSSY or self.resolution:
             return LOSSY
@@ -51,11 +51,11 @@ class ClipSelection:
         return self.clip.motion(self.frames, self.resolution, decimate=self.decimate)
 
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
-        """The channels of ``joints``, which are called ``names``."""
+        """The channels of ``joints``, under their ``names``."""
         return self._table(*self._rows(joints), 0, names)
 
     def of_signal(self, signal: int, stored: bool, names: list[str], units: list[str]) -> Table:
-        """All channels of another signal, in their units, or as they are ``stored``."""
+        """All channels of another signal, in their units, or as ``stored``."""
         values, mask = self.clip.read_masked(self.frames, None, self.resolution, signal=signal)
         scaling = self.clip.scaling(signal)
         if scaling is not None:
@@ -208,5 +208,4 @@ def _floats(values: Values) -> NDArray[np.float64]:
 
 
 def _repeated(numbers: NDArray[np.int64], n_rows: int) -> NDArray[np.int64]:
-    """A number for every row."""
     return np.repeat(numbers, n_rows // max(1, len(numbers)))

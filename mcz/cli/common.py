@@ -47,10 +47,10 @@ class Exit(IntEnum):
     """Exit codes of ``mcz`` and ``mcz-info``, as docs/reference/scripts.md lists them."""
 
     FINE = 0
-    BAD_INPUT = 1  # a file is missing, unreadable, refused or not what it should be
+    BAD_INPUT = 1  # a file is missing, unreadable, refused or invalid
     USAGE = 2  # an unknown option or value, a missing extra, a target that exists and no --force
-    NOT_VERIFIED = 3  # verify or info --validate found something wrong
-    SALVAGED = 4  # --salvage wrote what could be read, and something was lost
+    NOT_VERIFIED = 3  # verify or info --validate reported a fault
+    SALVAGED = 4  # --salvage wrote the readable parts, and some were lost
     INTERRUPTED = 130
     TERMINATED = 143
 
@@ -69,7 +69,7 @@ Exit codes:
 class Failure(MczError):
     """An error of a command: a message and an exit code.
 
-    ``kind`` is what ``--json`` calls it: the class of the error behind it where there is one.
+    ``kind`` is its name in ``--json``: the class of the original error if there is one.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Failure(MczError):
 
 
 class JsonRefused(Failure):
-    """A command that has no JSON to print, not even of this error."""
+    """A command without JSON output, also of this error."""
 
 
 WIDEST_CELL = 48  # characters that the columns of a table are aligned to
@@ -114,7 +114,7 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
     except (KeyboardInterrupt, click.Abort):
         say("interrupted")
         return Exit.INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has seen enough
+    except BrokenPipeError:  # the reader of our output is done
         _give_up_output()
         return Exit.FINE
     except (click.ClickException, MczError, OSError, MemoryError) as error:
@@ -140,13 +140,15 @@ def _warnings_said() -> Iterator[None]:
             warnings.simplefilter("once", category)
         show = warnings.showwarning
 
-        def said(message: Warning | str, category: type[Warning], *where: Any, **to: Any) -> None:
+        def warning_line(
+            message: Warning | str, category: type[Warning], *where: Any, **to: Any
+        ) -> None:
             if issubclass(category, OURS):
                 say(str(message))
             else:
                 show(message, category, *where, **to)
 
-        warnings.showwarning = said
+        warnings.showwarning = warning_line
         yield
 
 
@@ -156,7 +158,6 @@ def _is_starved(error: ImportError) -> bool:
 
 
 def _failed(error: Exception, *, as_json: bool) -> Exit:
-    """Print an error; return its exit code."""
     failure = _failure_of(error)
     if as_json and not isinstance(failure, JsonRefused):
         say_json({"error": _facts(failure)})
@@ -200,7 +201,7 @@ def _facts(error: MczError) -> JsonObject:
 
 
 class _Terminated(BaseException):
-    """SIGTERM came: what is half written is taken away on the way out."""
+    """SIGTERM arrived: half-written files are removed on the way out."""
 
 
 @contextmanager
@@ -211,7 +212,7 @@ def _ended_by_signals() -> Iterator[None]:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         raise _Terminated
 
-    if current_thread() is not main_thread():  # only there can a handler be set
+    if current_thread() is not main_thread():  # handlers can only be set there
         yield
         return
     before = signal.signal(signal.SIGTERM, end)
@@ -268,15 +269,17 @@ def about(path: str) -> Iterator[None]:
 
 
 def existing(path: str, of_folders: str = "") -> None:
-    """Raise Failure where a local ``path`` is no file; ``of_folders``: what takes a folder."""
+    """Raise Failure unless a local ``path`` is a file; ``of_folders``: the command takes
+    folders.
+    """
     if path != "-" and "://" not in path and not Path(path).is_file():
         is_there = f"is a folder{of_folders}" if Path(path).is_dir() else "not a file"
         what = is_there if Path(path).exists() else "no such file"
         raise Failure(what, path=path or repr(path), kind="AccessError")
 
 
-def given(path: str) -> str | bytes:
-    """``path``, which has to be there; of ``-`` the bytes of standard input."""
+def bytes_or_path(path: str) -> str | bytes:
+    """``path``, which must exist; for ``-`` the bytes of standard input."""
     if path != "-":
         existing(path)
         return path
@@ -290,13 +293,13 @@ def given(path: str) -> str | bytes:
 
 @contextmanager
 def opened(path: str, **options: Any) -> Iterator[File]:
-    """The MCZ file at ``path``, or on standard input where that is ``-``; errors name it.
+    """The MCZ file at ``path``, or on standard input for ``-``; errors name it.
 
     ``options`` are those of ``mcz.open``.
     """
     import mcz
 
-    target = given(path)
+    target = bytes_or_path(path)
     with about(path), hinted(target, options), mcz.open(target, **options) as file:
         if file.grows:
             say(f"{path}: another process is appending to it; this is what it held before")
@@ -304,7 +307,7 @@ def opened(path: str, **options: Any) -> Iterator[File]:
 
 
 def damage_of(path: str, damage: Sequence[str]) -> Exit:
-    """Print what salvage found wrong; the exit code that it makes."""
+    """Print faults found by salvage; return the exit code."""
     for line in damage:
         say(f"{path}: salvage: {line}")
     return Exit.SALVAGED if damage else Exit.FINE
@@ -316,7 +319,7 @@ def exists(path: Path) -> Failure:
 
 
 def check_new(path: Path, force: bool) -> None:
-    """Raise Failure for a file that is there already, before work on it begins."""
+    """Raise Failure for an existing file before work on it begins."""
     if os.path.lexists(path) and not force:
         raise exists(path)
 
@@ -340,7 +343,7 @@ def plural(count: int, word: str) -> str:
 def table(rows: Sequence[Sequence[str]], right: str = "") -> list[str]:
     """Rows as lines of aligned columns, the first a heading; an "r" in ``right`` aligns right.
 
-    A cell of more than ``WIDEST_CELL`` characters shifts the rest of its own row alone.
+    A cell of more than ``WIDEST_CELL`` characters shifts only the rest of its own row.
 
     >>> table([["name", "n"], ["walk", "240"]], "lr")
     ['name    n', 'walk  240']
@@ -363,7 +366,7 @@ def table(rows: Sequence[Sequence[str]], right: str = "") -> list[str]:
 def to_frames(
     ctx: click.Context, param: click.Parameter, value: str | None
 ) -> tuple[int, int | None] | None:
-    """Callback of ``A:B``: frames A <= f < B counted from 0; either end may be left out."""
+    """Parse ``A:B``: frames A <= f < B counted from 0; either end may be left out."""
     if value is None:
         return None
     start, colon, stop = value.partition(":")
@@ -374,7 +377,7 @@ def to_frames(
 
 
 def to_rate(ctx: click.Context, param: click.Parameter, value: str | None) -> Fraction | None:
-    """Callback of a rate: frames a second as ``120``, ``29.97`` or ``30000/1001``."""
+    """Parse a rate: frames a second as ``120``, ``29.97`` or ``30000/1001``."""
     if value is None:
         return None
     rate = Fraction(0)
@@ -386,7 +389,7 @@ def to_rate(ctx: click.Context, param: click.Parameter, value: str | None) -> Fr
 
 
 def to_params(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> JsonObject:
-    """Callback of ``KEY=VALUE``; a value that reads as a number or a truth becomes one."""
+    """Parse ``KEY=VALUE``; numbers and truths are converted."""
     pairs = {}
     for value in values:
         key, equals, text = value.partition("=")

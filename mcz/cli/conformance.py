@@ -96,13 +96,13 @@ def _refuse(code: int, error: Exception) -> int:
 
 
 def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
-    """The answer to a request about the file ``data``; raises MczError where anything is wrong."""
+    """The answer to a request about the file ``data``; raises MczError for any fault."""
     import mcz
     from mcz.container.scan import scan
     from mcz.container.source import open_source
 
     # HEAD-01, STRICT-03
-    scan(open_source(data), whole=True)  # INDX may be of no use where something is unsupported
+    scan(open_source(data), whole=True)  # INDX may be useless if a part is unsupported
     with mcz.open(data, verify=True) as file:
         listing = "sources" if given.source else "arrays"
         parts = list(_sources(file) if given.source else _arrays(file, given))
@@ -133,12 +133,12 @@ def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
             except UnsupportedError as error:
                 lacking = lacking or error  # STRICT-05
                 read_segments(clip.container, signal)  # STRICT-05
-    if lacking is not None:  # and nothing else is wrong, which would count for more
+    if lacking is not None:  # with no other fault, which would count for more
         raise lacking
 
 
 def _signal_arrays(clip: Clip, signal: SignalInfo, given: argparse.Namespace) -> Iterator[Part]:
-    """The canonical array of a signal, then its mask where any value is invalid."""
+    """The canonical array of a signal, then its mask if any value is invalid."""
     if given.joints is not None and signal.channels is not None:
         return
     resolution = signal.coarser(given.resolution) if signal.index else given.resolution
@@ -177,7 +177,7 @@ def _part(clip: str, signal: str, array: str, values: Values | NDArray[np.bool_]
 
 
 def _sources(file: File) -> Iterator[Part]:
-    """Every file that is held under a name: of clips, attached, and further names."""
+    """Every stored file with a name: of clips, attached, and aliases."""
     from mcz.files.editing.unpacking import named_files
 
     lacking: UnsupportedError | None = None

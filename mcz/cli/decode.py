@@ -172,7 +172,7 @@ def decode(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Write what is wanted of an input, and say what became of it."""
+    """Write the requested outputs of an input, and report them."""
     file, salvage = given.file, given.salvage
     if output == "-" and (as_json or options.with_skeleton):
         raise JsonRefused("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
@@ -207,7 +207,6 @@ def decode(
 def _select_clips(
     file: File, output: str | None, names: tuple[str, ...], where: str | None
 ) -> list[Clip]:
-    """The clips that are asked for, or the only one; none where the file has none."""
     if where is not None:
         clips = file.chosen(names or None, where)
     elif not file.clips:
@@ -291,24 +290,24 @@ def convert_command(
     format of IN has the same bytes, unless --frames selects a part.
     """
     facts = {name: options.pop(name) for name in OF_SOURCES}
-    wanted = DecodeOptions(**options)
+    choice = DecodeOptions(**options)
     given = Input(file, max_decoded=max_decoded, facts=facts)
     suffix = suffix_of(output)
-    refuse(not suffix and wanted.target is None, f"{output}: it has no suffix; --to says a format")
-    if suffix != ".mcz" or wanted.target is not None:
+    refuse(not suffix and choice.target is None, f"{output}: it has no suffix; --to says a format")
+    if suffix != ".mcz" or choice.target is not None:
         refuse(
             not given.is_source and any(facts.values()),
             f"{' '.join(f'--{name}' for name in OF_SOURCES)} are of source files, {file} is none",
         )
-        return decode(given, wanted, output, names=names, where=where, force=force, as_json=as_json)
+        return decode(given, choice, output, names=names, where=where, force=force, as_json=as_json)
     refuse(not given.is_source, f"{output}: mcz extract takes clips out of an .mcz")
-    has_parts = bool(names or where or wanted.frames or wanted.joints)
+    has_parts = bool(names or where or choice.frames or choice.joints)
     refuse(has_parts, f"{output}: an .mcz is made of a whole file; mcz extract takes parts")
     from mcz.cli.encode import encode_command
 
-    facts |= {"rate": wanted.rate, "unit": wanted.unit, "up": wanted.up}
+    facts |= {"rate": choice.rate, "unit": choice.unit, "up": choice.up}
     settings: Settings = {"source": file, "output": output, "force": force, "as_json": as_json}
-    code: Exit = click.get_current_context().invoke(  # which calls no callbacks
+    code: Exit = click.get_current_context().invoke(  # without callbacks
         encode_command, params=None, **settings, **facts
     )
     return code

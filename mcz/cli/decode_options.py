@@ -52,7 +52,7 @@ class DecodeOptions(NamedTuple):
 
 
 def check_options(options: DecodeOptions, salvage: bool) -> None:
-    """Raise Failure for options that do not go together."""
+    """Raise Failure for options that exclude each other."""
     if not options.target or options.is_converted:
         refuse(options.joints is not None, "--joints needs --to csv or --to npz")
     lone = options.frames is not None or options.resolution or salvage or options.filtered
@@ -72,7 +72,7 @@ def check_options(options: DecodeOptions, salvage: bool) -> None:
 
 
 def check_signal(options: DecodeOptions) -> None:
-    """Raise Failure for options that do not go with a signal that is not the motion."""
+    """Raise Failure for options that do not apply to a signal other than the motion."""
     numbers = options.target is not None and not options.is_converted
     refuse(options.signal is not None and not numbers, "--signal needs --to csv or --to npz")
     refuse(options.stored and options.signal in (None, EVENTS), "--stored needs --signal")
@@ -100,12 +100,12 @@ def refuse(wrong: bool, reason: str) -> None:
 
 
 SOURCE_GIVEN = "a source file, no .mcz; -o or --to says what it becomes, mcz encode compresses it"
-NO_LIMIT = 2**53  # of what is decoded: it was made here
+NO_LIMIT = 2**53  # of decoded bytes: the file was just written
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """A file, and how it is read; ``facts`` are arguments of ``mcz.encode`` for a source file."""
+    """A file, and options of its reader; ``facts`` are arguments of ``mcz.encode``."""
 
     file: str
     salvage: bool = False
@@ -120,7 +120,7 @@ class Input:
         return is_source(self.file)
 
     def with_facts(self, options: DecodeOptions) -> tuple[Input, DecodeOptions]:
-        """The same with the facts among what is wanted of a source file, and the rest of that."""
+        """Move the facts from the options of a source file to the input; return both."""
         refuse(self.salvage or self.unverified, "--salvage and --unverified need an .mcz")
         facts = {"unit": options.unit, "up": options.up, "rate": options.rate}
         given = replace(self, facts=dict(self.facts) | facts)

@@ -46,18 +46,16 @@ if TYPE_CHECKING:
 
 
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
-Cut = tuple[int, int | None] | None
+FrameRange = tuple[int, int | None] | None
 
 
 def _to_radius(ctx: click.Context, param: click.Parameter, value: float) -> float:
-    """Callback of a radius in cm."""
     if not 0 < value < inf:
         raise click.BadParameter(f"{value:g} is not a length above 0")
     return value
 
 
 def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[str, ...]:
-    """Callback of names with commas between them."""
     return () if value is None else tuple(name.strip() for name in value.split(",") if name.strip())
 
 
@@ -103,7 +101,7 @@ def diff_command(
     b: str,
     names: tuple[str, ...],
     where: str | None,
-    frames: Cut,
+    frames: FrameRange,
     max_decoded: int | None,
     as_json: bool,
     **settings: Any,
@@ -141,9 +139,7 @@ def diff_command(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Options:
-    """Options of a comparison, and facts that the files lack."""
-
-    frames: Cut
+    frames: FrameRange
     unit: str | None
     rate: Fraction | None
     up: str | None
@@ -158,7 +154,7 @@ class _Options:
 
 @dataclass(frozen=True, slots=True)
 class _Loaded:
-    """One motion to compare, where its frames begin in its clip, and its ratios."""
+    """One motion to compare, its first frame in its clip, and its ratios."""
 
     motion: Motion
     start: int
@@ -208,11 +204,11 @@ class _Side:
             return _Loaded(facts.completing(motion), start, ratios)
 
 
-def _range(frames: Cut, n_frames: int, what: str) -> tuple[int, int]:
+def _range(frames: FrameRange, n_frames: int, owner: str) -> tuple[int, int]:
     start, stop = frames or (0, None)
     stop = n_frames if stop is None else stop
     if not start <= stop <= n_frames:
-        raise Failure(f"{what} has frames 0 to {n_frames}, not {start}:{stop}", Exit.USAGE)
+        raise Failure(f"{owner} has {n_frames} frames; {start}:{stop} is outside", Exit.USAGE)
     return start, stop
 
 
@@ -222,7 +218,7 @@ def _has_several(left: _Side, right: _Side) -> bool:
 
 
 def _filter_names(left: _Side, right: _Side, names: tuple[str, ...], where: str) -> tuple[str, ...]:
-    """The names of the clips that match ``where``; none where each side is one clip."""
+    """The names of the clips that match ``where``; empty if each side is one clip."""
     side = left if left.file is not None else right
     if side.file is None:
         raise Failure("--where chooses among the clips of an .mcz", Exit.USAGE)
@@ -245,7 +241,6 @@ def _common(left: _Side, right: _Side, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _compare(left: _Side, right: _Side, name: str | None, options: _Options) -> JsonObject:
-    """The document of one pair of motions."""
     from mcz.files.reading.differences import document_of
     from mcz.kinematics.metrics.diff_document import diff_document
 
@@ -269,7 +264,7 @@ def _compare(left: _Side, right: _Side, name: str | None, options: _Options) -> 
     return document | {"ratios_a": one.ratios, "ratios_b": other.ratios}
 
 
-FEW = 12  # names of joints that are shown
+SHOWN_NAMES = 12  # names of joints that a line lists
 SMALL_CM = 1.0  # below it distances are shown in mm
 
 
@@ -281,12 +276,12 @@ def lines_of(a: str, b: str, document: JsonObject) -> Iterator[str]:
     yield f"{a} ({names[0]}) and {b} ({names[1]})"
     joints, feet = entries.pop("joints"), entries.pop("feet")
     equal = entries.pop("equal_joints")
-    beside = entries.pop("differences", ())
+    differences = entries.pop("differences", ())
     by_joint, contacts = entries.pop("by_joint", []), entries.pop("contact_list", [])
     is_same = entries.get("mse_raw") == 0.0
     yield from (f"  {line}" for line in figure_lines(entries))
     if equal and not is_same:
-        yield f"  joints equal in every bit: {first_of(equal, FEW)}"
+        yield f"  joints equal in every bit: {first_of(equal, SHOWN_NAMES)}"
     if feet is not None:
         yield f"  {_feet_line(feet)}"
     if joints is not None:
@@ -296,25 +291,25 @@ def lines_of(a: str, b: str, document: JsonObject) -> Iterator[str]:
         if known:
             shown = ", ".join(f"{key} {value:.4g}" for key, value in known.items())
             yield f"  {path}: {shown}"
-    yield from (f"  {_difference_line(entry)}" for entry in beside)
+    yield from (f"  {_difference_line(entry)}" for entry in differences)
     yield from (f"  note: {in_options(note)}" for note in notes)
     for rows in (_table_by_joint(by_joint), _table_of_contacts(contacts)):
         yield from (f"  {line}".rstrip() for line in rows)
 
 
 def _difference_line(difference: Params) -> str:
-    """Something beside the numbers that A and B do not say alike."""
     if difference["a"] is None and difference["b"] is None:
         return f"{difference['what']}: not the same"
-    text = f"{difference['what']}: {_said(difference['a'])} in A, {_said(difference['b'])} in B"
+    a, b = _value_text(difference["a"]), _value_text(difference["b"])
+    text = f"{difference['what']}: {a} in A, {b} in B"
     for key in ("only_in_a", "only_in_b", "changed"):
         if names := difference[key]:
             words = key.replace("_", " ").replace(" a", " A").replace(" b", " B")
-            text += f"; {words}: {first_of(names, FEW)}"
+            text += f"; {words}: {first_of(names, SHOWN_NAMES)}"
     return text
 
 
-def _said(value: object) -> str:
+def _value_text(value: object) -> str:
     return "unknown" if value is None else f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
@@ -332,7 +327,7 @@ def _joint_lines(a: str, b: str, joints: JsonObject) -> Iterator[str]:
         )
     for path, names in ((a, joints["only_in_a"]), (b, joints["only_in_b"])):
         if names:
-            yield f"joints of {path} alone: {first_of(names, FEW)}"
+            yield f"joints only in {path}: {first_of(names, SHOWN_NAMES)}"
 
 
 def _feet_line(feet: Params) -> str:
@@ -340,13 +335,13 @@ def _feet_line(feet: Params) -> str:
     guessed = " (guessed)" if feet["up_guessed"] else ""
     assumed = " (assumed)" if feet["rate_assumed"] else ""
     return (
-        f"feet: {first_of(feet['joints'], FEW)}; {feet['up_axis']} up{guessed}, "
+        f"feet: {first_of(feet['joints'], SHOWN_NAMES)}; {feet['up_axis']} up{guessed}, "
         f"{feet['frame_rate']:g} frames a second{assumed}"
     )
 
 
 def _table_by_joint(joints: Sequence[Params]) -> list[str]:
-    """A row a joint: distances of its points and of its shell, in mm where all are small."""
+    """A row a joint: distances of its points and of its shell, in mm if all are small."""
     if not joints:
         return []
     in_cm = joints[0]["mean_position_error_cm"] is not None
@@ -370,7 +365,7 @@ def _table_by_joint(joints: Sequence[Params]) -> list[str]:
 
 
 def _table_of_contacts(contacts: Sequence[Params]) -> list[str]:
-    """A row a contact: its frames, how far the foot slides in it, and both paths, in mm."""
+    """A row a contact: its frames, the sliding of the foot in it, and both paths, in mm."""
     if not contacts:
         return []
     keys = ("mean_mm", "max_mm", "path_mm", "path_original_mm")

@@ -95,7 +95,7 @@ def encode_command(
     if source == "-":
         return _encode_piped(output, skeleton, force, as_json, format_name, **options)
     if format_name is not None:
-        raise Failure("--format says what standard input is; SRC has a suffix", Exit.USAGE)
+        raise Failure("--format is for standard input; SRC has a suffix", Exit.USAGE)
     existing(source, f": mcz pack {shlex.quote(source)} OUT.mcz")
     if source.lower().endswith(".mcz"):
         raise Failure("is an .mcz already; mcz append adds it to another", path=source)
@@ -117,7 +117,7 @@ def _encode_piped(
     refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     if options["codec"] is not None and codes_live(options["codec"], options["params"] or {}):
         if as_json:
-            raise JsonRefused("--json: what is coded frame by frame has no document", Exit.USAGE)
+            raise JsonRefused("--json: coding frame by frame has no document", Exit.USAGE)
         encode_lines(output, force, format_name, skeleton, **options)
         return Exit.FINE
     if output is None:

@@ -1,4 +1,4 @@
-"""The figures of a comparison or of a quality record, as people read them."""
+"""The figures of a comparison or of a quality record, as text."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SHOWN_ELSEWHERE = (
     *("contacts", "contact_frames", "slide_mean_mm", "slide_max_mm", "slide_max_frame"),
     *("slide_max_joint", "slide_path_mm", "slide_path_original_mm"),
 )
-WIDEST = 80  # characters that are shown of a key or value: records in files may say anything
+WIDEST = 80  # shown characters of a key or value: records in files may have any
 UNCUT = "uncut_"  # in front of the figures of a clip before it was cut
 UNITS = {  # by how an id ends
     **dict.fromkeys(("mse", "mse_raw"), "channels, squared"),
@@ -29,7 +29,7 @@ DISTANCES = ("rms_coordinate_error", "mean_position_error", "max_position_error"
 def figure_lines(entries: Params) -> Iterator[str]:
     """Lines of the figures in ``entries``, metric id -> number or text; None is left out."""
     figures = {_shown(k): _shown(v) for k, v in entries.items() if v is not None}
-    yield from _what(figures)
+    yield from _subject_words(figures)
     rows = [["metric", "value", "unit", "cm", ""], *_rows(figures)]
     if len(rows) > 1:
         yield from table(rows, "lrlrl")
@@ -63,7 +63,7 @@ def reached(quality: Mapping[str, str]) -> str:
     return f"{text}; {remark}" if remark else text
 
 
-def _what(figures: Mapping[str, str]) -> Iterator[str]:
+def _subject_words(figures: Mapping[str, str]) -> Iterator[str]:
     """Settings, and how much was compared."""
     if "codec" in figures:
         settings = [
@@ -118,7 +118,6 @@ def _radius(figures: Mapping[str, str]) -> str:
 
 
 def _contact_lines(figures: Mapping[str, str]) -> Iterator[str]:
-    """Lines about the contacts of feet and their sliding."""
     if "contacts" not in figures:
         return
     some = figures["contacts"] != "0" and "contact_frames" in figures

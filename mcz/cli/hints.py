@@ -1,4 +1,4 @@
-"""Hints in words of the command line, and the hint at what can be salvaged from a damaged file."""
+"""Hints in words of the command line, and the hint at parts that salvage can read."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def hinted(target: str | bytes, options: Params) -> Iterator[None]:
     except FormatError as error:
         from mcz.files.reading.file import is_source
 
-        whole = None if options.get("salvage") else _whole(target)
+        whole = None if options.get("salvage") else _intact_counts(target)
         if whole is not None:
             error.add(note=whole, hint=Hint.SALVAGE)
         elif isinstance(target, str) and is_source(target):
@@ -63,7 +63,7 @@ def hinted(target: str | bytes, options: Params) -> Iterator[None]:
         raise
 
 
-def _whole(target: str | bytes) -> str | None:
+def _intact_counts(target: str | bytes) -> str | None:
     """Counts of the intact parts of a damaged local file; None if there are none."""
     import mcz
 

@@ -55,11 +55,11 @@ if TYPE_CHECKING:
     from mcz.files.reading.faults import Problem
     from mcz.files.reading.file import File
 
-FEW = 4  # clips that are shown in full; more are shown as a table
+CLIPS_IN_FULL = 4  # more clips are shown as a table
 WIDEST = 200  # characters that are shown of a value of metadata
 NOTES = ("source-note", "skeleton-note")
 PARTS = ("payload", "overhead", "model", "source_chunk", "hash", "quality")
-RATIOS = (  # of the bytes that a codec wrote, which restore no source alone
+RATIOS = (  # of the bytes that a codec wrote, which alone restore no source
     ("cr_float32", "float32 a channel / payload and overhead"),
     ("cr_40B", "40 bytes a joint and frame / payload and overhead"),
 )
@@ -137,10 +137,9 @@ def info_command(
 
 
 def _add_previews(file: File, document: JsonObject, as_json: bool, preview: bool | None) -> None:
-    """Add a preview to each clip that is shown in full, where it is wanted."""
     if preview is False or (preview is None and (as_json or not is_terminal())):
         return
-    if not as_json and len(document["clips"]) > FEW:
+    if not as_json and len(document["clips"]) > CLIPS_IN_FULL:
         return
     from mcz.show.pictures.energy import is_cheap
 
@@ -220,13 +219,13 @@ def lines(file: str, document: JsonObject) -> Iterator[str]:
         f"{document['profile']} profile, {document['file_bytes']:,} bytes"
     )
     yield f"  {', '.join(counts)}"
-    for skeleton in document["skeletons"][:FEW]:
+    for skeleton in document["skeletons"][:CLIPS_IN_FULL]:
         yield from skeleton_lines(skeleton)
-    if len(document["skeletons"]) > FEW:
+    if len(document["skeletons"]) > CLIPS_IN_FULL:
         yield ""
-        yield f"{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
+        yield f"{len(document['skeletons']) - CLIPS_IN_FULL:,} more skeletons; --json lists them"
     alone = bool(document["parts"]) and len(document["clips"]) == 1
-    if len(document["clips"]) <= FEW:
+    if len(document["clips"]) <= CLIPS_IN_FULL:
         for clip in document["clips"]:
             yield from _clip(clip, alone)
             if not alone:
@@ -249,7 +248,7 @@ def _preview(clip: JsonObject) -> Iterator[str]:
 
 
 def _file_parts(document: JsonObject) -> Iterator[str]:
-    """Each part of the file, their sum, and what the stored files are against it."""
+    """Each part of the file, their sum, and its ratio to the stored files."""
     yield ""
     size = document["file_bytes"]
     yield from _part_table({**document["parts"], "file": size}, size)
@@ -264,7 +263,7 @@ def _part_table(parts: Mapping[str, int], whole: int) -> Iterator[str]:
 
 
 def _clip(clip: JsonObject, alone: bool) -> Iterator[str]:
-    """Lines about a clip; where it is ``alone`` the parts of the file stand for its own."""
+    """Lines about a clip; if it is ``alone`` the parts of the file replace its own."""
     yield ""
     yield (
         f"clip {clip['name']}: {plural(clip['n_frames'], 'frame')} {rate_text(clip)}, "
@@ -344,13 +343,12 @@ def _clips(clips: list[JsonObject]) -> list[str]:
 
 
 def _clip_ratio(clip: JsonObject) -> str:
-    """The source against the payload and the other parts that are shown beside it."""
+    """The ratio of the source to the payload and the other parts shown with it."""
     own = sum(clip[f"{part}_bytes"] for part in PARTS)
     return f"{clip['source_bytes'] / own:.2f}" if clip["source_bytes"] else ""
 
 
 def _notes(clips: list[JsonObject]) -> Iterator[str]:
-    """Notes on the sources of clips and skeletons, each text once."""
     named: dict[str, list[str]] = {}
     for clip in clips:
         for key in NOTES:
@@ -359,7 +357,7 @@ def _notes(clips: list[JsonObject]) -> Iterator[str]:
     if named:
         yield ""
     for note, names in named.items():
-        yield f"{note}: {first_of(names, FEW)}"
+        yield f"{note}: {first_of(names, CLIPS_IN_FULL)}"
 
 
 def main() -> None:

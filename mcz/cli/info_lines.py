@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mcz.kinematics.poses.motion_like import MotionLike
 
 
-DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
+DEEPEST = 90  # characters before a joint's name; deeper joints are not indented further
 
 
 def skeleton_lines(skeleton: JsonObject) -> Iterator[str]:
@@ -50,7 +50,7 @@ def _height(height: float, unit_cm: float | None) -> str:
 
 
 def _is_plain(joints: list[JsonObject]) -> bool:
-    """Return whether the joints are numbers in order, all alike, as those of an array are."""
+    """Return whether the joints are numbers in order, all alike, as joints of an array."""
     alike = -1, joints[0]["channels"]
     return all(
         joint["name"] == str(index) and (joint["parent"], joint["channels"]) == alike
@@ -99,7 +99,7 @@ def time_lines(times: JsonObject | None) -> Iterator[str]:
         yield f"  time       {times['first']:.6g} s to {times['last']:.6g} s{gaps}"
 
 
-MOST = 24  # rows of a list; --json has all of them
+MOST_ROWS = 24  # rows of a list; --json has all of them
 
 
 def recording_lines(recording: JsonObject | None) -> Iterator[str]:
@@ -138,7 +138,7 @@ def recording_lines(recording: JsonObject | None) -> Iterator[str]:
 
 
 def array_lines(arrays: list[JsonObject] | None) -> Iterator[str]:
-    """The lines for a part ``arrays`` of the document: each that is read, then what is kept."""
+    """The lines for a part ``arrays`` of the document: arrays that are read, then kept ones."""
     if arrays is None:
         return
     for array in arrays:
@@ -169,10 +169,10 @@ def _recording_facts(recording: JsonObject) -> Iterator[str]:
 def _rows(heads: list[str], rows: list[list[str]], align: str) -> Iterator[str]:
     if not rows:
         return
-    shown = table([heads, *rows[:MOST]], align)
+    shown = table([heads, *rows[:MOST_ROWS]], align)
     yield from (f"    {line}".rstrip() for line in shown)
-    if len(rows) > MOST:
-        yield f"    {len(rows) - MOST} more; --json lists them"
+    if len(rows) > MOST_ROWS:
+        yield f"    {len(rows) - MOST_ROWS} more; --json lists them"
 
 
 def _time(time: float | None) -> str:
@@ -186,7 +186,7 @@ def _vector(vector: list[float | None] | None) -> str:
 
 
 def source_lines(file: str, document: JsonObject) -> Iterator[str]:
-    """The text of a source file's document, without line ends; the rest as of an MCZ file."""
+    """The text of a source file's document, without line ends; the rest as for an MCZ file."""
     kind = document["format"].upper()
     yield f"{file}: {kind}, {document['file_bytes']:,} bytes; not yet an .mcz (mcz encode)"
     for skeleton in document["skeletons"]:
@@ -219,14 +219,14 @@ def source_lines(file: str, document: JsonObject) -> Iterator[str]:
 
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"
 EIGHTHS, PLAIN = "▏▎▍▌▋▊▉█", "#"
-Bar = tuple[str, int]  # what takes so many bytes
+Bar = tuple[str, int]  # name and number of bytes
 
 WIDTH = 24  # letters of the longest bar
 MOST_BARS = 8
 
 
 def preview_of(clip: Clip) -> JsonObject:
-    """The keys of a clip's preview; ``motion`` is None where there is none."""
+    """The keys of a clip's preview; ``motion`` is None if there is none."""
     from mcz.files.reading.sizes import byte_shares
 
     shares = [
@@ -237,7 +237,7 @@ def preview_of(clip: Clip) -> JsonObject:
 
 
 def motion_of(motion: MotionLike) -> JsonObject | None:
-    """The speeds of equal parts of the time, and what they are in; None where they are unknown."""
+    """The speeds of equal parts of the time, and their unit; None if unknown."""
     from mcz.show.pictures.energy import motion_energy
 
     speeds = motion_energy(motion)
@@ -251,7 +251,7 @@ def motion_of(motion: MotionLike) -> JsonObject | None:
 
 
 def preview_lines(preview: JsonObject) -> Iterator[str]:
-    """The preview as people read it."""
+    """The preview as text."""
     motion = preview["motion"]
     if motion is not None and any(speed is not None for speed in motion["mean_speeds"]):
         speeds = motion["mean_speeds"]
@@ -292,8 +292,7 @@ def bar(share: float, blocks: bool | None = None) -> str:
 
 
 def bars_of(payload: Sequence[JsonObject]) -> tuple[list[Bar], list[Bar]]:
-    """Bars and the rest: the joints that take most, or of one group its
-    resolutions."""
+    """Bars and the rest: the largest joints, or the resolutions of a single group."""
     from mcz.files.reading.sizes import Share, by_group
 
     groups = by_group(

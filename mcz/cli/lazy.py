@@ -1,6 +1,6 @@
 """Groups of commands, each of which is loaded when it is called.
 
-No command of theirs takes an option twice, unless that makes a list.
+Commands reject repeated options, unless an option makes a list.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def lazy_group(commands: Mapping[str, str]) -> type[click.Group]:
     return Commands
 
 
-# What else people call our commands.
+# Other people's names of our commands.
 OTHER_NAMES = {
     "check": "verify",
     "compare": "diff",
@@ -79,7 +79,7 @@ def refuse_repeats(
     arguments: Sequence[str],
     parent: click.Context | None = None,
 ) -> None:
-    """Raise UsageError where ``arguments`` give an option twice that does not take a list."""
+    """Raise UsageError if ``arguments`` repeat an option that does not make a list."""
     settings: Settings = {"help_option_names": HELP, **command.context_settings}
     with click.Context(command, parent, name, **settings) as context:
         if command.no_args_is_help and not arguments:

@@ -1,4 +1,4 @@
-"""``mcz list``: what is in a file, from its index alone unless other columns are asked for."""
+"""``mcz list``: the contents of a file, from its index unless other columns are requested."""
 
 from __future__ import annotations
 
@@ -107,7 +107,6 @@ def _rows(file: File, clips: Sequence[Clip], names: list[str] | None) -> list[Js
 
 
 def _totals(clips: Sequence[Clip]) -> JsonObject:
-    """Total clips and frames, and seconds of the clips with a known rate."""
     known = [clip for clip in clips if clip.frame_rate is not None]
     return {
         "clips": len(clips),
@@ -118,7 +117,7 @@ def _totals(clips: Sequence[Clip]) -> JsonObject:
 
 
 def _text(name: str, value: object) -> str:
-    """A value as a table has it; of the index ? stands for a rate that is unknown."""
+    """A value in the table; ? for an unknown rate of the index."""
     if value is None:
         return "?" if name in ("frame_rate", "duration") else ""
     if name == "duration":
@@ -160,7 +159,7 @@ def _print_others(
 
 
 def _as_csv(rows: list[JsonObject], names: Sequence[str]) -> str:
-    """RFC 4180 but for its line ends: a head, then the values, none of them a formula."""
+    """RFC 4180 except for its line ends: a head, then the values, none of them a formula."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     for row in ([*names], *([row[name] for name in names] for row in rows)):

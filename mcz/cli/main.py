@@ -70,7 +70,7 @@ def cli() -> None:
 
 
 def main() -> None:
-    for library in ("OMP", "OPENBLAS", "MKL"):  # sums in one order, however many cores there are
+    for library in ("OMP", "OPENBLAS", "MKL"):  # sums in one order on any number of cores
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     sys.exit(run(cli, "mcz"))
 
@@ -99,7 +99,7 @@ def completion_command(shell: str) -> Exit:
     completes = get_completion_class(shell)
     if completes is None:
         raise Failure(f"no completion for {shell}", Exit.USAGE)
-    # bash asks for no check of its version: the script says what it needs by itself
+    # bash needs no check of its version: the script states its needs
     source = completes(cli, {}, "mcz", "_MCZ_COMPLETE")
     echo(*(source.source_template % source.source_vars()).splitlines())
     return Exit.FINE

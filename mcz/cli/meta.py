@@ -25,17 +25,18 @@ from mcz.cli.options import clips_option, json_option, where_option
 from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
-    from mcz.files.editing.metadata_edit import Said
+    from mcz.files.editing.metadata_edit import Entries
     from mcz.files.reading.clip import Clip
     from mcz.files.reading.file import File
 
-    Rows = Callable[[File], tuple[dict[str, dict[str, str]], list[str]]]  # by clip; unknown ones
+    # by clip; names of unknown clips
+    Rows = Callable[[File], tuple[dict[str, dict[str, str]], list[str]]]
 
 
 def _to_pairs(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, str]:
-    """Callback of ``KEY=VALUE``; the value is text as it stands."""
+    """Parse ``KEY=VALUE``; the value is kept as text."""
     from mcz.files.editing.metadata_edit import registered_key
 
     pairs = {}
@@ -167,7 +168,7 @@ def _changes(
     clips: tuple[str, ...],
     where: str | None,
     of_file: bool,
-    edits: Said,
+    edits: Entries,
     rows: Rows | None,
 ) -> tuple[dict[str, dict[str, str | None]], list[str]]:
     """Metadata changes by clip, and the table rows that match no clip."""
@@ -175,9 +176,9 @@ def _changes(
     unknown: list[str] = []
     with opened(file) as opened_file, about(file):
         if rows is not None:
-            found, unknown = rows(opened_file)
-            wanted = {clip.name for clip in opened_file.chosen(clips or None, where)}
-            changes = {name: dict(row) for name, row in found.items() if name in wanted}
+            table_rows, unknown = rows(opened_file)
+            clip_names = {clip.name for clip in opened_file.chosen(clips or None, where)}
+            changes = {name: dict(row) for name, row in table_rows.items() if name in clip_names}
         if edits:
             names: Iterable[str] = (
                 [""] if of_file else _select_clips(opened_file, clips, where, False)
@@ -190,13 +191,13 @@ def _changes(
 
 def _set(
     file: str,
-    changes: Mapping[str, Said],
+    changes: Mapping[str, Entries],
     rate: Fraction | float | None,
     rated: tuple[tuple[str, ...], str | None, bool],
     purge: bool,
     as_json: bool,
 ) -> Exit:
-    """Set what is said; ``rated``: of which clips the rate, and whether by force."""
+    """Set metadata; ``rated``: the clips that get a rate, and whether by force."""
     import mcz
 
     outcomes = []

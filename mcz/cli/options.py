@@ -15,7 +15,7 @@ from mcz.model.types import Settings
 EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
 RATE_HELP = "Set the frame rate of files that state none (120, 29.97, 30000/1001)."
 ITS_RATE_HELP = "Set the frame rate (120, 29.97, 30000/1001), replacing the one in the source."
-PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}  # cm, as those of the codec posewave
+PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}  # cm, as for the codec posewave
 Function = Callable[..., object]
 
 
@@ -83,15 +83,15 @@ decoded_option = click.option(
 
 
 def threads_option(function: Function) -> Function:
-    """``--threads``, as the argument ``threads`` of ``mcz.open`` and ``mcz.write``."""
+    """``--threads``, the argument ``threads`` of ``mcz.open`` and ``mcz.write``."""
 
     @wraps(function)
     def command(*args: object, threads: int | None, **options: object) -> object:
         if threads is None:
             return function(*args, **options)
-        from mcz.model.threads import limited
+        from mcz.model.threads import limit_threads
 
-        with limited(threads):
+        with limit_threads(threads):
             return function(*args, **options)
 
     return click.option(
@@ -103,14 +103,14 @@ def threads_option(function: Function) -> Function:
 
 
 def jobs_option(function: Function) -> Function:
-    """``--jobs``, as the argument ``jobs`` of ``mcz.pack`` and its kin, by default all cores."""
+    """``--jobs``, the argument ``jobs`` of ``mcz.pack`` and others, by default all cores."""
 
     @wraps(function)
     def command(*args: object, jobs: int | None, **options: object) -> object:
-        from mcz.files.jobs import limited
+        from mcz.files.jobs import limit_jobs
         from mcz.model import threads
 
-        with limited(jobs or threads.processors()):
+        with limit_jobs(jobs or threads.processors()):
             return function(*args, **options)
 
     return click.option(
@@ -122,7 +122,7 @@ def jobs_option(function: Function) -> Function:
 
 
 def copies_option(default: str) -> Callable[[Function], Function]:
-    """``--copies``, as the argument ``copies`` of ``mcz.encode`` and its kin, None: ``default``."""
+    """``--copies``, the argument ``copies`` of ``mcz.encode`` and others, None: ``default``."""
     return click.option(
         "--copies/--no-copies",
         default=None,
@@ -141,7 +141,7 @@ clips_option = click.option(
 
 
 def _to_query(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Callback of a query: refuse what is none before a file is opened; raises OptionError."""
+    """Check a query before a file is opened; raises OptionError."""
     if value is not None:
         from mcz.files.queries import Query
 
@@ -159,7 +159,7 @@ where_option = click.option(
 
 
 def token_option(what: str) -> Callable[[Function], Function]:
-    """``--token``, as the argument ``token``; ``what`` begins its help."""
+    """``--token``, the argument ``token``; ``what`` begins its help."""
     hint = "Use MCZ_TOKEN to keep it out of the process list. It is not encryption."
     return click.option("--token", metavar="TEXT", envvar="MCZ_TOKEN", help=f"{what} {hint}")
 
@@ -175,7 +175,7 @@ param_option = click.option(
 
 
 def _to_unit(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Callback of a length unit: ``cm``, or one of so many centimeters, ``5.6444cm``."""
+    """Parse a length unit: ``cm``, or a number of centimeters, ``5.6444cm``."""
     from mcz.errors import OptionError
     from mcz.model.units import unit_cm_of
 
@@ -188,7 +188,7 @@ def _to_unit(ctx: click.Context, param: click.Parameter, value: str | None) -> s
 
 
 def unit_option(what: str) -> Callable[[Function], Function]:
-    """``--unit``, as the argument ``unit``, the length unit of ``what``."""
+    """``--unit``, the argument ``unit``, the length unit of ``what``."""
     return click.option(
         "--unit",
         metavar="UNIT",
@@ -198,7 +198,7 @@ def unit_option(what: str) -> Callable[[Function], Function]:
 
 
 def up_option(what: str) -> Callable[[Function], Function]:
-    """``--up``, as the argument ``up``; ``what`` is its help."""
+    """``--up``, the argument ``up``; ``what`` is its help."""
     return click.option("--up", type=click.Choice(("x", "y", "z", "-x", "-y", "-z")), help=what)
 
 
@@ -228,18 +228,18 @@ key_error_option = click.option(
 
 
 def skeleton_option(help_text: str) -> Callable[[Function], Function]:
-    """``--skeleton``, as the argument ``skeleton``: the path of an ASF."""
+    """``--skeleton``, the argument ``skeleton``: the path of an ASF."""
     path = click.Path(readable=False)
     return click.option("--skeleton", metavar="FILE.asf", type=path, help=help_text)
 
 
 def frames_option(help_text: str) -> Callable[[Function], Function]:
-    """``--frames``, as the argument ``frames``: a range."""
+    """``--frames``, the argument ``frames``: a range."""
     return click.option("--frames", metavar="A:B", callback=to_frames, help=help_text)
 
 
 def rate_option(help_text: str = RATE_HELP) -> Callable[[Function], Function]:
-    """``--rate``, as the argument ``rate``, by default of files that state none."""
+    """``--rate``, the argument ``rate``, by default of files that state none."""
     return click.option("--rate", metavar="R", callback=to_rate, help=help_text)
 
 
@@ -271,7 +271,7 @@ def check_force_rate(options: Settings) -> None:
 
 
 def encoding_options(function: Function) -> Function:
-    """``--codec --effort --param --unit --up ...``, as the arguments of those names."""
+    """``--codec --effort --param --unit --up ...``, the arguments of those names."""
     options = (
         click.option(
             "--codec", metavar="NAME", help="Set the codec. Default: fast, which is lossless."
@@ -310,7 +310,7 @@ def encoding_options(function: Function) -> Function:
     ) -> object:
         if quality is not None:
             if "max_error_cm" in params or "preset" in params:
-                raise click.UsageError("--quality and --param both say what the error may be")
+                raise click.UsageError("--quality and --param both limit the error")
             codec, params = codec or "lossy", params | {"max_error_cm": quality}
         return function(*args, codec=codec, params=params, **others)
 

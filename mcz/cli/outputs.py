@@ -1,4 +1,4 @@
-"""Outputs: the formats that their suffixes stand for, and writing them, all or none."""
+"""Outputs: formats by suffix, and writing of several files, all or none."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ def is_folder(output: str) -> bool:
 
 
 def file_in(output: str, source: str, suffix: str = "") -> str:
-    """``output``, or where that is a folder the file in it that is called as ``source`` is.
+    """``output``, or a file in it if it is a folder, with the name of ``source``.
 
-    ``suffix``: in place of that of ``source``. A folder with a slash at the end is made. Raises
-    Failure where standard input, which has no name, would give one.
+    ``suffix`` replaces the suffix of ``source``. A folder with a slash at the end is created.
+    Raises Failure for standard input, which has no name.
     """
     if output == "-" or not is_folder(output):
         return output
@@ -69,17 +69,17 @@ def file_in(output: str, source: str, suffix: str = "") -> str:
 
 
 def target_of(suffix: str) -> str | None:
-    """The target whose files have a suffix, None where there is none."""
+    """The target whose files have a suffix, None if there is none."""
     from mcz.files.reading.file import suffixes_of
 
     return next((name for name in TARGETS if suffix in suffixes_of(name)), None)
 
 
 def target_of_clip(clip: Clip, output: str | None, *, plain: bool) -> str | None:
-    """The target that ``output`` asks for, None for the source file.
+    """The target for ``output``, None for the source file.
 
-    ``plain``: the source file itself will do where the suffix is one of its own. Raises Failure for
-    a suffix of no format that can be written.
+    ``plain``: the source file itself is acceptable if the suffix is one of its own. Raises Failure
+    for a suffix without a writable format.
     """
     suffix = suffix_of(output)
     own = () if clip.source is None else clip.source.suffixes
@@ -92,9 +92,9 @@ def target_of_clip(clip: Clip, output: str | None, *, plain: bool) -> str | None
 
 
 def check_kept(output: str | None, name: str, *, is_skeleton: bool) -> None:
-    """Raise Failure where the suffix of an output is not that of the file ``name`` itself.
+    """Raise Failure unless an output has the suffix of the file ``name`` itself.
 
-    A skeleton's file is an ASF, whatever it is called.
+    A skeleton's file is an ASF under any name.
     """
     suffix, own = suffix_of(output), PurePosixPath(name).suffix.lower()
     if suffix in ("", own) or (is_skeleton and suffix == ".asf"):
@@ -102,7 +102,7 @@ def check_kept(output: str | None, name: str, *, is_skeleton: bool) -> None:
     if target_of(suffix) is not None or suffix in OTHERS:
         reason = f"what is kept is {name}, which is not converted to {suffix}"
         raise Failure(reason, Exit.USAGE, path=output)
-    raise _unknown(str(output), suffix, f"what is kept is {name}, not", (own,))
+    raise _unknown(str(output), suffix, f"the stored file is {name}, not", (own,))
 
 
 def _unknown(output: str, suffix: str, text: str, own: tuple[str, ...]) -> Failure:
@@ -125,7 +125,7 @@ class Output(NamedTuple):
 
 
 def check_count(output: str | None, count: int) -> None:
-    """Raise Failure where an output names one file, and several clips are wanted."""
+    """Raise Failure if an output names one file, and several clips are requested."""
     if count > 1 and output is not None and not is_folder(output):
         raise Failure(f"-o {output} is one file, for {count} clips; name a folder", Exit.USAGE)
 
@@ -138,9 +138,9 @@ def deliver(
     as_json: bool,
     facts: JsonObject,
 ) -> None:
-    """Write the outputs of the files that were ``given``, the first above all, and say so.
+    """Write the outputs of the ``given`` files, the first as the main one, and print a summary.
 
-    What stands in the way of one of them is found before the first is written.
+    Obstacles of any output are found before the first is written.
     """
     from mcz.files.writing.atomic import refuse_inputs
 
@@ -174,7 +174,7 @@ def deliver(
 
 
 def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Path]:
-    """The path of each output; an output name given by the user is that of the first."""
+    """The path of each output; a name given by the user is the first output's."""
     named = output is not None and not is_folder(output)
     folder = Path() if file == "-" else Path(file).parent
     if output is not None:
@@ -184,7 +184,7 @@ def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Pat
 
 
 def plain_name(name: str) -> str:
-    r"""A name from a file as one that every system can hold, below any folder.
+    r"""Make a name from a file valid on every system, and below any folder.
 
     >>> plain_name("walk.bvh"), plain_name(".."), plain_name("a\0b"), plain_name("con.bvh")
     ('walk.bvh', '__', 'a_b', 'con_.bvh')

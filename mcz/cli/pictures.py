@@ -74,12 +74,12 @@ def moving_options(function: Function) -> Function:
 
 @contextmanager
 def moving_of(
-    path: str, *, name: str | None, max_decoded: int | None, **said: Any
+    path: str, *, name: str | None, max_decoded: int | None, **facts: Any
 ) -> Iterator[Motion | Clip]:
     """The motion of a source file, or a clip of an .mcz that stays open; errors name the file.
 
-    ``said`` are fields of ``SourceOptions``. They change a source file alone: whoever draws a clip
-    is given the same.
+    ``facts`` are fields of ``SourceOptions``. They change only a source file: a clip gets them from
+    its drawing function.
     """
     import mcz
     from mcz.files.reading.file import is_mcz
@@ -91,8 +91,8 @@ def moving_of(
         return
     existing(path)
     with about(path):
-        read = {name: said.pop(name) for name in ("skeleton", "arrays", "model")}
-        yield SourceOptions(**said).completing(mcz.read(path, **read))
+        read = {name: facts.pop(name) for name in ("skeleton", "arrays", "model")}
+        yield SourceOptions(**facts).completing(mcz.read(path, **read))
 
 
 def cut_of(frames: tuple[int, int | None] | None, motion: Motion | Clip) -> tuple[int, int] | None:
@@ -103,7 +103,7 @@ def cut_of(frames: tuple[int, int | None] | None, motion: Motion | Clip) -> tupl
     return start, motion.n_frames if stop is None else stop
 
 
-VIEWS = ("front", "side", "top", "three-quarter")  # as in mcz.show.pictures, which takes longer
+VIEWS = ("front", "side", "top", "three-quarter")  # as in mcz.show.pictures, whose import is slow
 
 
 def to_size(

@@ -99,7 +99,7 @@ def _check_protection(file: str, as_json: bool) -> Exit:
 
 
 def _print_protection(file: str, recovery: Recovery) -> None:
-    problems = recovery.told()
+    problems = recovery.lines()
     if not problems:
         echo(f"{file}: none of {recovery.n_blocks:,} blocks is bad")
     for line in problems:
@@ -190,7 +190,7 @@ def bag_command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_j
     with about(folder):
         path = mcz.bag(files, folder, dict(lines), software=f"mcz {mcz.__version__}")
         check = check_bag(path)
-    if check.problems:  # as of a disk that does not keep what it is given
+    if check.problems:  # a disk may not keep the written bytes
         raise Failure(check.problems[0], Exit.NOT_VERIFIED, path=folder)
     if as_json:
         print_json({"output": folder, "files": check.files, "bytes": check.n_bytes})

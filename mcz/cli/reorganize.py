@@ -38,7 +38,7 @@ def delete_command(
     import mcz
 
     if not names and where is None:
-        raise Failure("name what to delete, or say --where", Exit.USAGE)
+        raise Failure("name the things to delete, or use --where", Exit.USAGE)
     with about(file), Progress() as progress:
         report = mcz.delete_clips(
             file, names, where=where, aliases=aliases, output=output, force=force, progress=progress

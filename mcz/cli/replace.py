@@ -118,12 +118,12 @@ def replace_command(
 
 
 def read_values(path: str, clip: Clip, joint: str) -> NDArray[np.float64]:
-    """The columns of the joint in a table, NaN where it says invalid; raises Failure."""
+    """The columns of the joint in a table, NaN where marked invalid; raises Failure."""
     from mcz.files.tables.files import channel_names
 
     is_npz = Path(path).suffix.lower() == ".npz"
     all_names = channel_names(clip.skeleton, clip.signals[0].channels)
-    if not is_npz:  # as the CSV export has them
+    if not is_npz:  # as the CSV export writes them
         all_names = [*map(printable, all_names)]
     expected = [all_names[column] for column in clip.skeleton.columns(clip.skeleton.find(joint))]
     reading = _read_npz if is_npz else _read_csv
@@ -133,13 +133,13 @@ def read_values(path: str, clip: Clip, joint: str) -> NDArray[np.float64]:
         raise Failure(
             f"not a table of numbers: {' '.join(str(error).split())}", path=path
         ) from None
-    older = {f"{name}.value": name for name in expected}  # as tables were called up to 0.9.0
+    older = {f"{name}.value": name for name in expected}  # names of columns up to 0.9.0
     names = [older.get(name, name) for name in names]
     missing = [name for name in expected if name not in names]
     if not missing:
         return values[:, [names.index(name) for name in expected]]
     if any(name in names for name in all_names) or values.shape[1] != len(expected):
-        raise Failure(f"no column {missing[0]}, and not {len(expected)} columns alone", path=path)
+        raise Failure(f"no column {missing[0]}, and not exactly {len(expected)} columns", path=path)
     return values
 
 

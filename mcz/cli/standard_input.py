@@ -39,18 +39,18 @@ if TYPE_CHECKING:
 
 
 NAME = "standard input"
-PATIENCE = 0.3  # seconds of waiting for input between two looks whether there was an interrupt
+PATIENCE = 0.3  # seconds between two checks for an interrupt while waiting for input
 
 
 def standard_input() -> BinaryIO:
-    """Standard input as bytes; raises Failure where it is closed."""
+    """Standard input as bytes; raises Failure if it is closed."""
     if sys.stdin is None:
         raise Failure(f"{NAME} is closed")
     return sys.stdin.buffer
 
 
 def live_input(timeout: float | None = None) -> BinaryIO:
-    """Standard input of which lines are read as they come, and an interrupt is never missed."""
+    """Standard input whose lines are read as they arrive, without missing an interrupt."""
     stream = standard_input()
     raw = getattr(stream, "raw", None)
     if raw is None or sys.platform == "win32":  # which cannot wait for a pipe
@@ -61,10 +61,10 @@ def live_input(timeout: float | None = None) -> BinaryIO:
 
 
 class Awaited(RawIOBase):
-    """Waits for bytes without reading: a read does not see an interrupt that came just before.
+    """Waits for bytes without reading: a read ignores an interrupt that came just before.
 
-    It ends where ``raw`` does, where the connection breaks, and after ``timeout`` seconds without a
-    byte (None: never); ``ending`` says which of the last two it was.
+    It ends at the end of ``raw``, when the connection breaks, and after ``timeout`` seconds without
+    a byte (None: never); ``ending`` names the latter two.
     """
 
     def __init__(self, raw: RawIOBase, timeout: float | None = None) -> None:
@@ -92,7 +92,7 @@ class Awaited(RawIOBase):
 
 @contextmanager
 def stored(format_name: str | None) -> Iterator[str]:
-    """The path of a file, for as long as the block runs, that holds all of standard input."""
+    """The path of a file with all of standard input, within the block."""
     from mcz.files.live.text_writer import suffix_of
 
     data = standard_input().read()
@@ -101,7 +101,7 @@ def stored(format_name: str | None) -> Iterator[str]:
     with about(NAME):
         suffix = suffix_of(data, format_name)
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "stdin" / f"stdin{suffix}"  # with nothing beside it
+        path = Path(folder) / "stdin" / f"stdin{suffix}"  # alone in its folder
         path.parent.mkdir()
         path.write_bytes(data)
         yield str(path)
@@ -110,7 +110,7 @@ def stored(format_name: str | None) -> Iterator[str]:
 def encode_lines(
     target: str | None, force: bool, format_name: str | None, skeleton: str | None, **options: Any
 ) -> None:
-    """Encode standard input frame by frame to ``target``, - or None being standard output."""
+    """Encode standard input frame by frame to ``target``; - or None is standard output."""
     from mcz.files.live.text_writer import begin_live
     from mcz.files.reading.source_files import SourceOptions
     from mcz.files.writing.source_encoder import encoding_options
@@ -118,7 +118,7 @@ def encode_lines(
     options["profile"] = options["profile"] != "base"
     for name in ("verbatim", "profile", "copies", "effort"):
         if options.pop(name):
-            raise Failure(f"--{name} has no meaning for what is coded frame by frame", Exit.USAGE)
+            raise Failure(f"--{name} has no meaning for coding frame by frame", Exit.USAGE)
     stream = live_input()
     name = format_name or ("bvh" if skeleton is None else "amc")
     with about(NAME), live_output(target, force) as sink:
@@ -134,7 +134,7 @@ def encode_lines(
 
 @contextmanager
 def aborting(writer: LiveWriter) -> Iterator[None]:
-    """Say of an error that it leaves the clip without an end."""
+    """Add to errors that the clip is left without an end."""
     try:
         yield
     except MczError as error:
@@ -144,7 +144,7 @@ def aborting(writer: LiveWriter) -> Iterator[None]:
 
 
 def report_live(target: str | None, writer: LiveWriter) -> None:
-    """Say what was written to ``target``, - or None being a pipe, and what it took."""
+    """Report the frames written to ``target``, - or None being a pipe, and their size."""
     traffic = writer.traffic
     rates = ""
     if traffic.seconds:
@@ -168,7 +168,7 @@ def report_live(target: str | None, writer: LiveWriter) -> None:
 
 
 def rate_warning(traffic: LiveTraffic) -> str:
-    """A line about a rate that framing alone exceeds."""
+    """A warning for a rate that framing alone exceeds."""
     assert traffic.seconds is not None
     all_, coded = (n / 125 / traffic.seconds for n in (traffic.frames, traffic.coded))
     return (
@@ -192,7 +192,7 @@ def live_output(target: str | None, force: bool) -> Iterator[BinaryIO | _Late]:
 
 
 class _Late:
-    """A file that is opened for its first bytes: what is refused before leaves an old one alone."""
+    """A file that is opened for its first bytes: an error before leaves an old one unchanged."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -218,7 +218,7 @@ def _is_special(path: Path) -> bool:
 
 MOST_LINE = 2**24  # bytes of a line
 SET = b"# set "
-NUMBER, TIME, STATE = "frame", "time", "state"  # columns beside the values, as decoders print them
+NUMBER, TIME, STATE = "frame", "time", "state"  # columns besides the values, as printed by decoders
 COORDINATES = ("x", "y", "z", "tx", "ty", "tz")
 
 Row = NDArray[np.float64] | JsonObject
@@ -227,10 +227,10 @@ Row = NDArray[np.float64] | JsonObject
 class Rows:
     """Iterates over rows, (n_channels,), NaN where a value is missing.
 
-    ``names`` are those of the first line; None where ``n_channels`` says that there is none.
-    A line ``# set name=value ...`` gives a dict, other lines that begin with # are left out.
-    Raises SourceError, with the number of the line or row, for what is no such row, and for a last
-    line without a line end, which may have been cut.
+    ``names`` are from the first line; None if ``n_channels`` is given, without such a line. A line
+    ``# set name=value ...`` gives a dict, other lines that begin with # are left out. Raises
+    SourceError, with the number of the line or row, for a bad row, and for a last line without a
+    line end, which may be truncated.
     """
 
     def __init__(self, stream: BinaryIO, *, binary: bool, n_channels: int | None = None) -> None:
@@ -257,14 +257,13 @@ class Rows:
         return names[self._drop_first : len(names) - self._drop_last]
 
     def expect(self, n_channels: int) -> None:
-        """Say how many values make a row."""
+        """Set the number of values of a row."""
         self._width = n_channels
 
     def __iter__(self) -> Iterator[Row]:
         return self._binary_rows() if self._binary else self._text_rows()
 
     def _line(self) -> bytes | None:
-        """The next line without its end; None where there is none."""
         line = self._stream.readline(MOST_LINE + 1)
         if not line:
             return None
@@ -287,7 +286,7 @@ class Rows:
         if len(cells) != self._width:
             raise SourceError(f"line {self._at}: {len(cells)} values of {self._width}")
         try:
-            if any(b"_" in cell for cell in cells):  # which Python takes for a digit's neighbor
+            if any(b"_" in cell for cell in cells):  # Python accepts an underscore between digits
                 raise ValueError(f"a value with _ in it, among {len(cells)}")
             return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
         except ValueError as error:
@@ -311,12 +310,12 @@ class Rows:
 
 
 def _are_coordinates(names: Sequence[str]) -> bool:
-    """Return whether the names are coordinates; a joint may be named like one of our columns."""
+    """Return whether the names are coordinates; a joint may have the name of one of our columns."""
     return bool(names) and all(name.rpartition(".")[2] in COORDINATES for name in names)
 
 
 def skeleton_in(path: str) -> Skeleton:
-    """The skeleton in a .bvh, .asf or .mcz file, without its source; raises as its reader does."""
+    """The skeleton in a .bvh, .asf or .mcz file, without its source; raises as its reader."""
     from dataclasses import replace
 
     import mcz

@@ -1,4 +1,4 @@
-"""``mcz stream``: rows of numbers to a live stream, and back, as they come."""
+"""``mcz stream``: rows of numbers to a live stream, and back, as they arrive."""
 
 from __future__ import annotations
 
@@ -293,7 +293,7 @@ def stream_decode_command(
         reader = stream_decode(stream, lost=lost, join=join, post_filter=post_filter, rate=rate)
         try:
             _print_all(reader, _BinaryRows() if binary else _TextRows(states=states))
-        except BrokenPipeError:  # whoever read it has seen enough
+        except BrokenPipeError:  # the reader of our output is done
             raise
         except TruncatedError as error:
             if not reader.summary.stream_bytes:
@@ -346,8 +346,6 @@ class _TextRows:
 
 
 class _BinaryRows:
-    """A line of names, then binary32 values."""
-
     def names(self, names: list[str]) -> bytes:
         return _csv(names)
 
@@ -383,7 +381,7 @@ def _print_all(reader: LiveReader, printer: _TextRows | _BinaryRows) -> None:
 
 
 def _print_summary(where: str, reader: LiveReader) -> None:
-    """Say on standard error what came."""
+    """Report the received frames on standard error."""
     summary: Any = reader.summary
     for remark in summary.remarks:
         say(f"{where}: {remark}")

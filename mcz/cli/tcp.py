@@ -1,4 +1,4 @@
-"""A live stream over TCP: to whoever connects, from the beginning or from where one can join."""
+"""A live stream over TCP: to any client, from the beginning or from an entry point."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from mcz.cli.standard_input import Awaited
 if TYPE_CHECKING:
     from mcz.files.live.writer import LiveWriter
 
-MOST_WAITING = 4 * 2**20  # bytes that a client may be behind
-LINGER = 10.0  # seconds that clients have for the rest, once all is coded
-PATIENCE = 10.0  # seconds in which a client sends its token
+MOST_WAITING = 4 * 2**20  # bytes that a client may lag behind
+LINGER = 10.0  # seconds that clients have for the rest, after the last frame
+PATIENCE = 10.0  # seconds in which a client must send its token
 LOOPBACK = "127.0.0.1"
 
 
 def address_of(text: str) -> tuple[str, int]:
-    """``HOST:PORT``; the loopback where there is no host. Raises Failure."""
+    """Parse ``HOST:PORT``; the loopback without a host. Raises Failure."""
     host, colon, port = text.rpartition(":")
     plain = port.isascii() and port.isdigit() and len(port) <= 5 and int(port) <= 65_535
     if not colon or not plain or not _is_name(host):
@@ -48,7 +48,7 @@ def connected(
 ) -> Iterator[BinaryIO]:
     """Connect to ``HOST:PORT`` and yield its binary stream; ``token`` is sent first if given.
 
-    The stream ends after ``timeout`` seconds of silence. Raises Failure where nothing comes at all.
+    The stream ends after ``timeout`` seconds of silence. Raises Failure if no byte arrives at all.
     """
     with (
         socket.create_connection(address_of(text), timeout) as connection,
@@ -67,7 +67,7 @@ def connected(
 
 
 def line_of(token: str) -> bytes:
-    """The line that a client sends first; raises Failure for what is no token."""
+    """The line that a client sends first; raises Failure for a bad token."""
     if not re.fullmatch("[!-~]{1,200}", token):
         raise Failure("a token has 1 to 200 characters of ASCII, no blanks", Exit.USAGE)
     return token.encode() + b"\n"
@@ -81,14 +81,13 @@ def is_here(host: str) -> bool:
 
 
 class Listener:
-    """Sends what is written to it to all clients; none of them can hold the writer up.
+    """Sends written bytes to all clients; no client can block the writer.
 
-    The first write is what every client gets first. Later ones are frames: a client that comes
-    after the first of them gets those from the next one on for which ``entry`` is not None, which
-    says how many bytes before it are not needed there. ``beat`` sends what all clients get and none
-    joins at. One that is ``MOST_WAITING`` bytes behind is
-    dropped. With ``token`` a client gets nothing until it has sent a line that is this token.
-    Raises OSError where the address cannot be had.
+    The first write goes first to every client. Later ones are frames: a client that connects after
+    the first of them starts at the next frame whose ``entry`` is not None, the number of bytes
+    before it that are not needed there. ``beat`` sends bytes to all clients that are not an entry.
+    A client that is ``MOST_WAITING`` bytes behind is dropped. With ``token`` a client gets no bytes
+    before it has sent a line with this token. Raises OSError if the address is not available.
     """
 
     def __init__(self, text: str, token: str | None = None) -> None:
@@ -116,12 +115,12 @@ class Listener:
         return not is_here(str(self._server.getsockname()[0]))
 
     def wait_for(self, n_clients: int) -> None:
-        """Wait until so many clients have come."""
+        """Wait for so many clients."""
         with self._changed:
             self._changed.wait_for(lambda: len(self._clients) >= n_clients)
 
     def write(self, data: bytes, /) -> int:
-        """Give ``data`` to all clients; never waits for them."""
+        """Send ``data`` to all clients without waiting for them."""
         data = bytes(data)
         with self._changed:
             if self._opening is None:
@@ -158,16 +157,15 @@ class Listener:
                 if self._is_closed:
                     return
                 say(f"a client could not connect: {error.strerror}")
-                sleep(0.1)  # what is short may be there again
+                sleep(0.1)  # the shortage may pass
                 continue
             name = f"{where[0]}:{where[1]}"
             if self._token is None:
                 self._admit(connection, name)
-            else:  # one that is silent keeps nobody else waiting
+            else:  # a silent client delays no other
                 Thread(target=self._ask, args=(connection, name), daemon=True).start()
 
     def _ask(self, connection: socket.socket, name: str) -> None:
-        """Admit a client that knows the token."""
         assert self._token is not None
         if compare_digest(_first_line(connection, len(self._token)), self._token):
             self._admit(connection, name)
@@ -187,9 +185,9 @@ class Listener:
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Take no more clients, and give those that are there a while for the rest."""
+        """Accept no more clients, and give the connected ones a while for the rest."""
         self._is_closed = True
-        with suppress(OSError):  # what waits in accept is not woken by close alone
+        with suppress(OSError):  # close alone does not wake a waiting accept
             self._server.shutdown(socket.SHUT_RDWR)
         self._server.close()
         self._accepting.join(LINGER)
@@ -199,7 +197,7 @@ class Listener:
 
 
 def _first_line(connection: socket.socket, size: int) -> bytes:
-    """The first ``size`` bytes, or what came of them until a line ended or the time was over."""
+    """The first ``size`` bytes, or those received until a line end or the timeout."""
     line, until = b"", monotonic() + PATIENCE
     with suppress(OSError):
         while len(line) < size and not line.endswith(b"\n") and (left := until - monotonic()) > 0:
@@ -212,8 +210,6 @@ def _first_line(connection: socket.socket, size: int) -> bytes:
 
 
 class _Client:
-    """One connection, and the thread that feeds it."""
-
     def __init__(self, connection: socket.socket, name: str, has_joined: bool) -> None:
         self.has_joined = has_joined
         self.is_gone = False
@@ -226,7 +222,7 @@ class _Client:
         self._thread.start()
 
     def put(self, data: bytes) -> None:
-        """Queue ``data``; the client is dropped where that is too much."""
+        """Queue ``data``; the client is dropped if the queue is too long."""
         with self._changed:
             if self.is_gone:
                 return
@@ -258,7 +254,7 @@ class _Client:
                 self._queue.clear()
             try:
                 self._connection.sendall(data)
-            except OSError:  # it left
+            except OSError:  # the client left
                 self._drop()
                 return
             with self._changed:
@@ -293,7 +289,7 @@ def listening(where: str, token: str | None) -> Iterator[Listener]:
 class Heart:
     """Writes a heartbeat after every ``seconds`` without a frame, from a thread; 0: never.
 
-    Who uses the writer holds ``lock``.
+    Users of the writer hold ``lock``.
     """
 
     def __init__(
@@ -320,7 +316,7 @@ class Heart:
             with self.lock:
                 now = self._writer.traffic.total
                 if now == sent and monotonic() - since >= self._seconds:
-                    with suppress(OSError):  # the next frame meets it, too
+                    with suppress(OSError):  # the next frame gets the same error
                         self._write()
                     now = self._writer.traffic.total
             if now != sent:

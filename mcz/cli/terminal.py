@@ -1,7 +1,7 @@
-"""The only way to standard output and standard error: nothing there steers a terminal.
+"""The only way to standard output and standard error, without control characters.
 
-Names in files may hold anything, so every command prints through these functions; a test allows no
-other module of the command line to print.
+Names in files may have any characters, so every command prints through these functions; a test
+forbids all other modules of the command line to print.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ ENCODING, KEPT = "utf-8", "surrogateescape"  # of text that is printed as bytes
 
 
 class StatusLine:
-    """A line on the terminal of standard error that goes when anything else is printed."""
+    """A line on the terminal of standard error that disappears when anything else is printed."""
 
     def __init__(self) -> None:
         self._width = 0  # columns of the line that is shown
 
     def show(self, text: str) -> None:
-        """Show ``text``, as much of it as fits, in place of the line before."""
+        """Show as much of ``text`` as fits, in place of the line before."""
         import shutil
 
         room, width, shown = shutil.get_terminal_size().columns - 1, 0, ""
@@ -98,7 +98,7 @@ def say_json(document: object) -> None:
 
 
 def json_text(document: object, indent: int | None = 2) -> str:
-    r"""``document`` as JSON, whose strings have escapes for what is not seen; see ``printable``.
+    r"""``document`` as JSON, with escapes for invisible characters; see ``printable``.
 
     >>> print(json_text("a\u202eb \x9b V\xe4sa"))
     "a\u202eb \u009b Väsa"
@@ -121,9 +121,9 @@ def print_json(document: object) -> None:
 
 
 def binary_output() -> BinaryIO:
-    """Standard output as bytes that are no text.
+    """Standard output as binary.
 
-    Raises AccessError where it is closed, OptionError where it is a terminal.
+    Raises AccessError if it is closed, OptionError if it is a terminal.
     """
     if _stdout().isatty():
         raise OptionError("binary data are not printed on a terminal; -o FILE or > FILE keeps them")
@@ -131,9 +131,9 @@ def binary_output() -> BinaryIO:
 
 
 def text_output() -> BinaryIO:
-    """Standard output as bytes of text: as they are, but with escapes on a terminal.
+    """Standard output as bytes of text: unchanged, but with escapes on a terminal.
 
-    Raises AccessError where it is closed.
+    Raises AccessError if it is closed.
     """
     return _Escaping(_buffer()) if _stdout().isatty() else _buffer()
 
@@ -150,7 +150,7 @@ def _buffer() -> BinaryIO:
 
 
 class _Escaping(io.BytesIO):
-    """Passes text on, what would steer a terminal escaped; lines come whole."""
+    """Passes text on, with escapes for control sequences; it gets whole lines."""
 
     def __init__(self, below: BinaryIO) -> None:
         super().__init__()

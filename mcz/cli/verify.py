@@ -1,4 +1,4 @@
-"""``mcz verify``: proof that a file is whole and gives its sources back."""
+"""``mcz verify``: proof that a file is intact and restores its sources."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    bytes_or_path,
     check_new,
     echo,
     existing,
-    given,
     opened,
     plural,
     print_json,
@@ -85,7 +85,7 @@ def verify_command(
     if quick and (where is not None or source is not None):
         raise Failure("--quick decodes nothing: it takes no --where and no --source", Exit.USAGE)
     if date is not None and report is None:
-        raise Failure("--date is that of the --report", Exit.USAGE)
+        raise Failure("--date belongs to --report", Exit.USAGE)
     if source is not None:
         existing(source)
     is_folder = Path(file).is_dir()
@@ -122,7 +122,6 @@ def _verify_bag(
     report_file: VerifyReport | None,
     as_json: bool,
 ) -> Exit:
-    """Check a bag, and each archive in it."""
     from mcz.files.bags import check_bag, is_bag
 
     if not is_bag(folder):
@@ -141,7 +140,7 @@ def _verify_bag(
                 rows, success = _verify_fully(path, None, None, max_decoded, report_file)
             if report_file is not None:
                 documents.append(report_file.document(rows, quick=quick, where=None))
-        except MczError as error:  # the others are checked all the same
+        except MczError as error:  # the others are still checked
             rows = [_row("file", "", [error.describe(OPTION_HINTS, with_path=False)])]
         failed = [row for row in rows if row["problems"]]
         files.append({"file": name, "verified": not failed, "parts": rows})
@@ -187,10 +186,9 @@ def _verify_fully(
 
 
 def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[JsonObject], str]:
-    """One row, that of the checksums, and a line for success."""
     from mcz.files.reading.faults import quick_check
 
-    target = given(file)
+    target = bytes_or_path(file)
     with about(file), Progress() as progress:
         seen, problems = quick_check(target, lambda done, total: progress(done, total, file))
     if report_file is not None:
@@ -238,7 +236,7 @@ def _counts(rows: list[JsonObject]) -> Iterator[str]:
 
 
 def _compare(file: File, source: str) -> JsonObject:
-    """Compare SRC with what is restored under its name, or with the only clip."""
+    """Compare SRC with the restored file of its name, or with the only clip."""
     restore = _find_restore(file, source)
     with about(source):
         expected = Path(source).read_bytes()
@@ -286,22 +284,22 @@ class VerifyReport:
         with about(path):
             refuse_inputs(path, inputs)
         check_new(self.path, force)
-        self.date = _now() if date is None else None if date == NONE else date
-        self._facts: JsonObject = {}  # of the file that was taken last
+        self.date = _current_time() if date is None else None if date == NONE else date
+        self._facts: JsonObject = {}  # of the last file
 
     def take(self, file: File) -> None:
-        """Keep what the report says of an open file."""
+        """Store the report of an open file."""
         from mcz.files.reading.verification import bytes_facts, contents
 
         self._facts = {**bytes_facts(file.container.source), **contents(file)}
 
     def take_bytes(self, file: str) -> None:
-        """Keep what can be said of a file that cannot be opened."""
+        """Store the facts of a file that cannot be opened."""
         from mcz.files.reading.file import open_bytes
         from mcz.files.reading.verification import bytes_facts
 
         with about(file):
-            source = open_bytes(given(file))
+            source = open_bytes(bytes_or_path(file))
             try:
                 self._facts = bytes_facts(source)
             finally:
@@ -329,7 +327,7 @@ class VerifyReport:
         files: Sequence[JsonObject],
         documents: Sequence[JsonObject],
     ) -> None:
-        """Write the report of a bag: of itself, then the ``documents`` of the archives in it.
+        """Write the report of a bag: its own facts, then the ``documents`` of its archives.
 
         ``files``: a row for each archive, unreadable ones included.
         """
@@ -367,8 +365,7 @@ class VerifyReport:
         write_output(self.path, f"{text}\n".encode("utf-8", "backslashreplace"), self.force)
 
 
-def _now() -> str:
-    """The date and time of the day, in UTC, to a second."""
+def _current_time() -> str:
     from datetime import UTC, datetime
 
     return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

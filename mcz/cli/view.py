@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from mcz.show.viewing.file_registry import Shelf
 
 
-SAID = ("skeleton", "rate", "unit", "up", "arrays", "model")  # what a file may not say itself
+FACT_OPTIONS = ("skeleton", "rate", "unit", "up", "arrays", "model")  # facts that a file may lack
 OF_PAGE = ("clips", "where", "codec", "effort", "params", "max_decoded", "most", "force")
 PAGES = (".html", ".htm")
 OF_SERVER = ("no_browser", "keep", "host", "port")
@@ -145,7 +145,7 @@ def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **op
         else:
             say(line)
 
-    facts = {key: options[key] for key in SAID}
+    facts = {key: options[key] for key in FACT_OPTIONS}
     shelf = Shelf(facts, told, salvage=options["salvage"], hints=OPTION_HINTS)
     try:
         for path in files:
@@ -196,14 +196,14 @@ def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str,
         try:
             server.site.visitors.wait(for_ever=keep)
         except KeyboardInterrupt:
-            return Exit.FINE  # that is how it is ended
+            return Exit.FINE  # the usual way to end it
     return Exit.FINE
 
 
 def _write_page(shelf: Shelf, output: str, as_json: bool, options: Settings) -> Exit:
     from pathlib import Path
 
-    from mcz.show.viewing.embedding import MOST_BYTES, Wanted, write_page
+    from mcz.show.viewing.embedding import MOST_BYTES, PageOptions, write_page
     from mcz.show.viewing.page import page
 
     force, most = options.pop("force"), options.pop("most") or MOST_BYTES
@@ -211,7 +211,7 @@ def _write_page(shelf: Shelf, output: str, as_json: bool, options: Settings) -> 
         check_new(Path(output), force)
     with about(output):
         written = write_page(
-            page(shelf.say), shelf, output, Wanted(**options), most=most, force=force
+            page(shelf.say), shelf, output, PageOptions(**options), most=most, force=force
         )
     if as_json:
         print_json({"output": output, **asdict(written)})
@@ -227,7 +227,7 @@ def _page_lines(output: str, written: PageWritten) -> list[str]:
 
 RERUN_SUFFIX = ".rrd"
 FACTS = ("rate", "unit", "up")
-MOST_BESIDE, MOST_VIEWS = 4, 64  # clips that are shown beside each other, and one at a time
+MOST_BESIDE, MOST_VIEWS = 4, 64  # clips shown side by side, and one at a time
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -240,7 +240,7 @@ def is_rerun(rerun: bool, output: str | None) -> bool:
 
 
 def show_in_rerun(shelf: Shelf, output: str | None, as_json: bool, options: Settings) -> Exit:
-    """Log every clip that is wanted, to ``output`` or to a viewer that is started."""
+    """Log every requested clip, to ``output`` or to a new viewer."""
     if output is None:
         recording = _recording()
         _check_screen()
@@ -282,7 +282,7 @@ def _check_screen() -> None:
 
 
 def _write_rerun(shelf: Shelf, output: str, options: Settings) -> tuple[list[JsonObject], int]:
-    """Log to a file, which appears when it is whole."""
+    """Log to a file, which appears when it is complete."""
     from mcz.files.writing.atomic import replacing
 
     check_new(Path(output), options["force"])
@@ -304,7 +304,6 @@ def _write_rerun(shelf: Shelf, output: str, options: Settings) -> tuple[list[Jso
 
 
 def _log_clips(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[JsonObject], int]:
-    """Log the clips; return their rows and the number of failures."""
     from mcz.errors import MczError
     from mcz.show.rerun import to_rerun, view_of
 
@@ -349,7 +348,7 @@ def _clips(shelf: Shelf, options: Settings) -> Iterator[tuple[str, Clip]]:
 
 
 def _complete(clip: Clip, options: Settings) -> Clip | Motion:
-    """The clip; decoded as a whole where options say what its file does not."""
+    """The clip; decoded completely if options state facts that its file lacks."""
     skeleton = clip.skeleton
     unknown = (clip.frame_rate is None, skeleton.unit_cm is None, not skeleton.up_axis)
     facts = [options[fact] for fact in FACTS]

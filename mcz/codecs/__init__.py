@@ -44,8 +44,8 @@ ENTRIES = {
     "pca-rdo": CodecEntry(20, 3, "spatial.pca_rdo"),
     "online": CodecEntry(21, 0, "online.online"),
 }
-SHARED = {16: "wavelet"}  # ids of which no codec has the name of the bitstream
-PRIVATE = range(128, 256)  # ids that SPEC.md never gives a meaning
+SHARED = {16: "wavelet"}  # ids whose bitstream has the name of no codec
+PRIVATE = range(128, 256)  # ids without a meaning in SPEC.md
 
 
 class Codecs(MutableMapping[str, Codec]):
@@ -88,8 +88,8 @@ class Codecs(MutableMapping[str, Codec]):
 
 CODECS = Codecs()
 DEFAULT = "fast"
-EFFORTS = {"fast": "fast", "best": "best"}  # by what they cost
-ALIASES = {"lossy": "posewave"}  # the best lossy one there is
+EFFORTS = {"fast": "fast", "best": "best"}  # by cost
+ALIASES = {"lossy": "posewave"}  # the best lossy codec
 
 
 def codec_by_name(name: str) -> Codec:

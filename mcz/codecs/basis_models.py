@@ -1,4 +1,4 @@
-"""Bases in integers: the models of kind 1, and those that everybody has.
+"""Bases in integers: the models of kind 1, and the well-known ones.
 
 SPEC.md, "Bases", is normative; the names below are its field names.
 """
@@ -27,7 +27,7 @@ MAX_ENTRIES = 2**22  # of all bases of a model
 MAX_KEPT = 2**17  # entries of a model that is kept for the next clip
 MAX_SHIFT = 40
 MAX_ENTRY = 2**40
-FINE = 15  # binary digits of an entry, where nobody asks for less
+FINE = 15  # binary digits of an entry by default
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +50,15 @@ def round_vectors(vectors: Floats, shift: int | Sequence[int] | Ints = FINE) -> 
 
 
 def falling_digits(n_vectors: int, most: int, least: int) -> Ints:
-    """Binary digits of each vector, fewer for later ones, which have next to no coefficients."""
+    """Binary digits of each vector, fewer for later ones, whose coefficients are mostly 0."""
     fall = (most - least + 2) * np.arange(n_vectors) / max(1, n_vectors - 1)
     return np.clip(np.rint(most - fall), least, None).astype(np.int64)
 
 
 def build_bases(bases: Sequence[Basis | Floats], shift: int = FINE) -> bytes:
-    """The data of a model of ``bases``; vectors that are no integers yet get ``shift`` digits.
+    """The data of a model of ``bases``; vectors that are not integers yet get ``shift`` digits.
 
-    Raises MotionError where there are too many, or an entry is too large.
+    Raises MotionError for too many vectors, or too large an entry.
     """
     parts = [basis if isinstance(basis, Basis) else round_vectors(basis, shift) for basis in bases]
     size = sum(part.entries.size for part in parts)
@@ -139,7 +139,7 @@ def _loop(
 
 
 def build_model(bases: Sequence[Basis | Floats], shift: int = FINE) -> Model:
-    """``bases`` as a model; raises MotionError as ``build_bases`` does."""
+    """``bases`` as a model; raises MotionError as ``build_bases``."""
     return Model(BASES, build_bases(bases, shift))
 
 
@@ -167,8 +167,8 @@ def find_bases(
 ) -> tuple[Basis, ...]:
     """The bases of the model with this id, which is well known or in the file.
 
-    ``check`` refuses heads that are not due, before their entries take memory. Raises
-    UnsupportedError where there is no such model, FormatError where it is none of bases.
+    ``check`` refuses wrong heads before their entries take memory. Raises UnsupportedError for an
+    unknown model, FormatError for one without bases.
     """
     model = _known_by_id().get(id_)
     if model is None and layout.find_model is not None:

@@ -22,15 +22,15 @@ from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, Skel
 from mcz.model.types import Bools, Floats
 
 RULES = ("sensitivity", "depth", "flat")
-LEAST_SHARE = 1 / 16  # a channel counts at least so much of what rotations do on average
-SAMPLED_FRAMES = 128  # where sensitivities are measured
+LEAST_SHARE = 1 / 16  # least weight of a channel, of the mean of rotations
+SAMPLED_FRAMES = 128  # for measuring sensitivities
 
 
 def weights_of(skeleton: Skeleton, sample: Floats, rule: str, *, unit_aware: bool) -> Floats:
     """The threshold of every channel at T_g = 1, (n_channels,), in source units.
 
-    ``sample``: frames of the signal, unwrapped. ``rule`` is one of ``RULES``; ``unit_aware`` turns
-    the T_g of a position channel from degrees into the length that the farthest point moves.
+    ``sample``: frames of the signal, unwrapped. ``rule`` is one of ``RULES``; ``unit_aware``
+    converts the T_g of a position channel from degrees to the length that the farthest point moves.
     """
     kinds = [channel.kind for channel in skeleton.channels]
     degree = math.pi / 180 if skeleton.angle_unit == "rad" else 1.0
@@ -54,11 +54,11 @@ def weights_of(skeleton: Skeleton, sample: Floats, rule: str, *, unit_aware: boo
 def _by_sensitivity(skeleton: Skeleton, sample: Floats, turns: Bools, degrees: Floats) -> Floats:
     """Thresholds with equal effect on the points; T_g is that of a rotation of average effect.
 
-    ``degrees`` (n_channels,) is what a degree is in the unit of a channel that ``turns``.
+    ``degrees`` (n_channels,) is one degree in the unit of a channel that ``turns``.
     """
     try:
         effects = sensitivities(skeleton, sample, SAMPLED_FRAMES)
-    except MczError:  # an unknown angle unit: there is no kinematics
+    except MczError:  # an unknown angle unit: no kinematics
         return degrees
     turning = (effects * degrees)[turns & (effects > 0)]
     average = float(np.sqrt(np.mean(turning**2))) if len(turning) else 1.0
@@ -71,9 +71,9 @@ def _by_sensitivity(skeleton: Skeleton, sample: Floats, turns: Bools, degrees: F
 def sensitivities(skeleton: Skeleton, values: Floats, max_frames: int | None = None) -> Floats:
     """The rms, over frames and all points, of |d position / d channel|, (n_channels,).
 
-    In length units per source unit of the channel, 0 for plain scalars. ``values`` are those of
-    the frames, (n_frames, n_channels); with ``max_frames`` at most so many of them are looked at,
-    evenly spread. Frames in which a channel or a point below it is NaN do not count.
+    In length units per source unit of the channel, 0 for plain scalars. ``values`` are those of the
+    frames, (n_frames, n_channels); at most ``max_frames`` of them are used, evenly spread. Frames
+    in which a channel or a point below it is NaN do not count.
     """
     if max_frames is not None:
         if max_frames < 1:

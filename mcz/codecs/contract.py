@@ -1,6 +1,6 @@
 """The codec contract: inputs, outputs and declarations of a codec.
 
-SPEC.md, "Codecs", is normative. A codec knows neither the container nor any source format.
+SPEC.md, "Codecs", is normative. A codec is independent of the container and of source formats.
 """
 
 from __future__ import annotations

@@ -64,9 +64,9 @@ class SegmentReader:
 
 
 class LiveRows:
-    """Unwraps frames that arrive one by one; a gap repeats the last value.
+    """Unwraps frames that arrive one by one; an invalid value repeats the last one.
 
-    ``keep`` commits a row as the last one; a row that is refused leaves no trace.
+    ``keep`` commits a row as the last one; a refused row changes no state.
     """
 
     def __init__(self, name: str, layout: Layout) -> None:

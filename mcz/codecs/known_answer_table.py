@@ -1,4 +1,4 @@
-"""The known answers, as ``tools/known_answers.py`` writes them."""
+"""The known answers, written by ``tools/known_answers.py``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class KnownAnswer:
-    """16 frames as a version of a codec stores them, in hex, and the SHA-256 of their values."""
+    """16 frames as stored by a version of a codec, in hex, and the SHA-256 of their values."""
 
     version: int
     grouping: str

@@ -15,9 +15,9 @@ from mcz.model.checks import number as number
 from mcz.model.types import Params, Settings
 
 MAX_DECIMALS = 15
-SCALED = 255  # in place of decimals: there are steps
+SCALED = 255  # in place of decimals: scaled steps
 MIDDLE_CODE = 128  # the step code of 1
-DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # of what a preset or the clip decides
+DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # defaults that a preset or the clip decides
 
 Presets = Mapping[str, Params]
 
@@ -27,7 +27,7 @@ class Parameter:
     """One parameter of a codec, as set by ``--param name=value``.
 
     ``inner``: set only by a search for a target, not listed and not recorded. ``show`` formats a
-    value as text that ``parse`` reads (None: numbers or words as they are, separated by commas).
+    value as text that ``parse`` reads (None: numbers or words, separated by commas).
     """
 
     name: str
@@ -47,7 +47,7 @@ class Parameter:
         return str(getattr(self.parse, "range", ""))
 
     def document(self) -> Settings:
-        """Name, default, range and meaning, as JSON has them."""
+        """Name, default, range and meaning, for JSON."""
         match = DEFAULT_IN_HELP.fullmatch(self.help)
         decided, meaning = (match[2], match[1]) if match else (None, self.help)
         default = decided if self.default is None else self.default
@@ -72,7 +72,7 @@ class Dial:
 
 
 def _bounds(text: Any) -> str:
-    """Keep bounds of channels as text; they are parsed where the units are known."""
+    """Keep bounds of channels as text; they are parsed once the units are known."""
     return str(text)
 
 

@@ -34,16 +34,18 @@ HEAD_SIZE = 9
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
+    """Encode the ordinals of ``source``; ``segment_frames`` 0 chooses lengths by size."""
 
     def prepare(first: int, stop: int) -> Callable[[], tuple[bytes, ...]]:
         ordinals = source.ordinals(first, stop)
-        return lambda: tuple(_build(ordinals[:, list(group)]) for group in source.layout.groups)
+        return lambda: tuple(
+            _build_stream(ordinals[:, list(group)]) for group in source.layout.groups
+        )
 
     return Encoded(b"", segments_by_guess(source, params["segment_frames"], SIZING, prepare))
 
 
-def _build(ordinals: Ints) -> bytes:
+def _build_stream(ordinals: Ints) -> bytes:
     """One stream: ``ordinals`` of one group, (rows, channels)."""
     parts = []
     for column in ordinals.T:
@@ -60,7 +62,7 @@ def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     groups = [list(asked.source.layout.groups[group]) for group in asked.groups]
     for span in asked.spans:
         ordinals = asked.source.ordinals(span.first, span.stop)
-        yield tuple(_build(ordinals[:, columns]) for columns in groups)
+        yield tuple(_build_stream(ordinals[:, columns]) for columns in groups)
 
 
 def decode(

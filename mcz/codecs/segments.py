@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
 
 TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
-SEGMENT_FRAMES = 4096  # where that leaves it open
+SEGMENT_FRAMES = 4096  # by default
 
 SEGMENT_FRAMES_PARAMETER = Parameter(
     "segment_frames",
@@ -59,8 +59,8 @@ Code = Callable[[int, int], Streams]  # frames first <= f < stop -> the streams 
 class Lengths:
     """Segment lengths: ``length`` frames at first, halved while segments are too large.
 
-    A length is a multiple of ``unit`` and at least ``least``, but for that of the last segment.
-    ``fixed``: the size decides nothing.
+    A length is a multiple of ``unit`` and at least ``least``, except for the last segment.
+    ``fixed``: sizes are ignored.
     """
 
     length: int
@@ -97,9 +97,9 @@ def segments_by_halving(
 class Sizing:
     """Size targets by which a codec of ordinals chooses its segment lengths.
 
-    About ``target`` bytes, ``most`` at most; ``value_bytes`` a value, before anything is known;
-    ``spare`` bytes are counted beside the streams; ``most_rows``. ``full``: a segment that came out
-    much smaller is coded again, longer.
+    About ``target`` bytes, ``most`` at most; ``value_bytes`` a value as the first estimate;
+    ``spare`` bytes besides the streams; ``most_rows``. ``full``: a segment that is much smaller is
+    encoded again, longer.
     """
 
     target: int
@@ -111,7 +111,7 @@ class Sizing:
 
 
 class SegmentPrefetch(AbstractContextManager["SegmentPrefetch"]):
-    """Codes a requested segment while other threads code those likely to be next."""
+    """Encodes a requested segment while other threads encode the likely next ones."""
 
     def __init__(self, prepare: Prepare, threads: int) -> None:
         self._prepare = prepare
@@ -148,7 +148,7 @@ def segments_by_guess(
     """Yield segments of ``fixed`` frames or, if that is 0, of as many as their size allows.
 
     A segment begins wherever the grids change. The length is kept while it is about right, so that
-    ``threads`` can work on the segments that follow.
+    ``threads`` can work on the following segments.
     """
     layout = source.layout
     per_frame = max(1, layout.n_channels) * layout.samples_per_frame

@@ -54,8 +54,8 @@ class Space:
 
     ``vectors`` (n_rows, n_points) has the rows of all matrices, one below the other, ``starts`` the
     first of each and the end; ``columns`` (n_matrices, n_points) the channel of each point;
-    ``weights`` and ``mean`` (n_channels,). ``courses`` (n_courses, frames of a window) stand in for
-    the cosines in time, None where there are none.
+    ``weights`` and ``mean`` (n_channels,). ``courses`` (n_courses, frames of a window) replace the
+    cosines in time, None without any.
     """
 
     step: float
@@ -71,13 +71,13 @@ class Space:
         return len(self.vectors)
 
     def transform(self) -> Transform:
-        """The transform as kernels take it."""
+        """The transform for the kernels."""
         return Transform(self.vectors, self.starts, self.columns, self.step, self.weights)
 
     def analysis(self) -> list[Floats]:
-        """Matrices that turn points into coefficients, (n_rows, n_points) each.
+        """Matrices from points to coefficients, (n_rows, n_points) each.
 
-        The inverse of what a decoder does, whose vectors are rounded.
+        The inverse of a decoder's transform, whose vectors are rounded.
         """
         parts = (self.vectors[a:b] for a, b in zip(self.starts, self.starts[1:], strict=False))
         return [np.asarray(np.linalg.pinv(part.T), np.float64) for part in parts]
@@ -151,7 +151,7 @@ def _weights(name: str, fields: SpaceFields, n_channels: int) -> Floats:
 
 
 def check(name: str, layout: Layout, spans: Sequence[Span], *, fresh: bool) -> None:
-    """Raise FormatError for a layout or segments that a codec of this family has not.
+    """Raise FormatError for a layout or segments that no codec of this family has.
 
     ``fresh``: all segments start so.
     """

@@ -44,10 +44,10 @@ from mcz.kinematics.angles import Unwrapper
 from mcz.model.motion import POSITION_KINDS, Skeleton
 from mcz.model.types import Floats
 
-DEFAULT_SHARE = 1 / 100  # of the spread of a clip's points: the step where none is given
+DEFAULT_SHARE = 1 / 100  # of the spread of a clip's points: the default step
 DEFAULT_DEGREES = 0.2  # of channels: the step for a rotation of average effect
-THRESHOLD = 0.6  # of a step: what is smaller becomes 0
-BLOCKS, BLOCK_FRAMES = 16, 240  # what an encoder looks at to choose
+THRESHOLD = 0.6  # of a step: smaller coefficients become 0
+BLOCKS, BLOCK_FRAMES = 16, 240  # sample of an encoder
 SPARSITY, ITERATIONS = 12, 30  # of bases of the clip itself, from its principal components on
 MOST_DIGITS, LEAST_DIGITS = 7, 3  # binary, of the first and the last vectors of such bases
 LARGEST = 2.0**80
@@ -139,7 +139,7 @@ def are_positions(skeleton: Skeleton) -> bool:
 
 
 def default_step(sample: Sample) -> float:
-    """The step where none is given: a share of how far the points of a frame are spread."""
+    """The default step: a share of the spread of the points of a frame."""
     if not sample.apart:
         return DEFAULT_DEGREES
     parts = [part for part in sample.matrices(sample.frames) if part.size]
@@ -150,8 +150,8 @@ def default_step(sample: Sample) -> float:
 def choose_space(name: str, sample: Sample, step: float, which: str, in_time: InTime) -> Choice:
     """Choose the bases that ``which`` names, or those with the smallest estimated size.
 
-    ``in_time`` is what the codec does over time before it goes on in space. Raises OptionError
-    where the one that is named does not fit.
+    ``in_time`` is the codec's transform over time before the one in space. Raises OptionError if
+    the named one does not fit.
     """
     fields = SpaceFields(
         flags=(APART if sample.apart else 0) | (WEIGHTED if sample.codes else 0),
@@ -187,9 +187,9 @@ def choose_space(name: str, sample: Sample, step: float, which: str, in_time: In
 
 
 def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Choice:
-    """The same before any frame is known: well-known bases where there are some, or cosines.
+    """The same before any frame is known: well-known bases if there are some, or cosines.
 
-    Raises OptionError where no step is given, or ``which`` asks for bases of the motion itself.
+    Raises OptionError without a step, or if ``which`` names bases of the motion itself.
     """
     if step is None:
         raise OptionError(f"{name}: the step has to be given, for no frame is known yet")
@@ -198,7 +198,7 @@ def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Ch
 
 
 def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
-    """A sample of no motion, and which bases can be had without; raises OptionError for learned."""
+    """A sample without frames, and the bases available then; raises OptionError for others."""
     if which == "learned":
         raise OptionError(f"{name}: basis learned needs all frames; mcz train makes one beforehand")
     skeleton = skeleton_of(name, layout)
@@ -210,7 +210,7 @@ def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
 
 
 def basis_at_hand(sample: Sample) -> str:
-    """The bases that need no look at the motion: well-known ones where some fit, or cosines."""
+    """The bases that do not depend on the motion: well-known ones if some fit, or cosines."""
     n_points = [part.shape[1] for part in sample.matrices(sample.frames)]
     fits = any(_fits(model, n_points) for model in known_models().values())
     return "known" if fits else "cosines"
@@ -242,9 +242,9 @@ def _vectors(model: Model) -> list[Floats]:
 
 
 def learn_model(sample: Sample) -> Model:
-    """Bases of the changes from frame to frame, made once for the same sample.
+    """Bases of the changes from frame to frame, computed once for the same sample.
 
-    Of a single frame there are none, and it is taken itself.
+    For a single frame they are of the frame itself.
     """
     steps = np.concatenate([frame_differences(block) for block in sample.blocks])
     if not len(steps):
@@ -254,7 +254,7 @@ def learn_model(sample: Sample) -> Model:
 
 
 class _SampleKey:
-    """Steps that leave it to the digest to tell them apart in the key of a cache."""
+    """Steps that compare by their digest as the key of a cache."""
 
     def __init__(self, steps: Floats) -> None:
         self.steps = steps
@@ -267,12 +267,12 @@ class _SampleKey:
 
 
 @lru_cache(maxsize=4)
-def _learn_cached(_digest: bytes, held: _SampleKey, apart: bool) -> Model:
+def _learn_cached(_digest: bytes, key: _SampleKey, apart: bool) -> Model:
     from mcz.codecs.transforms.lsdt import learn_basis
 
     bases: list[Basis | Floats] = []
-    for columns in columns_of(held.steps.shape[1], apart=apart):
-        points = held.steps[:, columns]
+    for columns in columns_of(key.steps.shape[1], apart=apart):
+        points = key.steps[:, columns]
         learned_basis = learn_basis(
             points,
             sparsity=min(SPARSITY, points.shape[1]),
@@ -293,7 +293,7 @@ def _expected_bytes(
     for block in sample.blocks:
         for part, basis in zip(sample.matrices(in_time(block)), vectors, strict=True):
             sizes = np.abs(part @ np.linalg.inv(basis)) / step
-            # Small ones count, too: changes add up until they are coded, and a basis that spreads
+            # Small ones count too: changes add up until they are coded, and a basis that spreads
             # them thinly must not pass for one that needs no coefficients.
             bits += 1.5 * float(np.log2(1 + sizes).sum())
             bits += 2.0 * float(np.minimum(1.0, sizes).sum())

@@ -1,7 +1,7 @@
-"""Training sets: the positions of clips from which bases are learned, and the learning of them.
+"""Training sets: positions of clips, and bases learned from them.
 
-``mcz train`` and ``tools/train_lsdt.py`` are thin over this module. Positions are in centimeters
-where the unit of every clip is known, else in the common unit.
+``mcz train`` and ``tools/train_lsdt.py`` call this module. Positions are in centimeters if the unit
+of every clip is known, else in the common unit.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Progress = Callable[[int, int, str], None]
 
 KINDS = ("frames", "steps", "windows")
 STEP_FRAMES = 8  # of a step: short against a movement, long against the noise of a capture
-WINDOW_FRAMES, WINDOW_KEPT = 120, 12  # of a window; its later coefficients hold next to nothing
+WINDOW_FRAMES, WINDOW_KEPT = 120, 12  # of a window; its later coefficients are nearly 0
 SIDES = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
 
 
@@ -33,9 +33,8 @@ SIDES = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", 
 class TrainingSet:
     """Clips of one set of points, each float64 (n_frames, J, 3), without missing points.
 
-    ``up`` is "x" to "-z"; ``unit`` is "cm", or "" where the clips do not say theirs.
-    ``n_filled`` counts the frames in which a point was missing; it lies on a straight line there,
-    as the codecs fill gaps.
+    ``up`` is "x" to "-z"; ``unit`` is "cm", or "" for clips without a known one. ``n_filled``
+    counts the frames with a missing point, which is interpolated linearly there, as by the codecs.
     """
 
     names: tuple[str, ...]
@@ -52,19 +51,19 @@ class TrainingSet:
 def training_set(motions: Iterable[Motion]) -> TrainingSet:
     """The positions of ``motions``.
 
-    Raises MotionError where their points, their up axes or what is known of their units differ,
-    where a motion has no positions, and where no position is known.
+    Raises MotionError where their points, their up axes or their known units differ, and for a
+    motion without positions, or without a known one.
     """
     first: tuple[str, TrainingSet] | None = None
     clips: list[Floats] = []
     n_filled = 0
     for motion in motions:
-        found = _of_one(motion)
+        positions = _of_one(motion)
         if first is None:
-            first = motion.name, found
-        _check_alike(first, (motion.name, found))
-        clips.extend(found.clips)
-        n_filled += found.n_filled
+            first = motion.name, positions
+        _check_alike(first, (motion.name, positions))
+        clips.extend(positions.clips)
+        n_filled += positions.n_filled
     if first is None:
         raise MotionError("training needs at least one clip")
     if not any(clip.any() for clip in clips):
@@ -102,21 +101,21 @@ def _check_alike(first: tuple[str, TrainingSet], other: tuple[str, TrainingSet])
         raise MotionError(f"of {names} one has a length unit, the other has none")
 
 
-def with_mirror_images(found: TrainingSet) -> TrainingSet:
-    """``found`` and its mirror image: left points become right ones, x is negated (z if x is up).
+def with_mirror_images(training: TrainingSet) -> TrainingSet:
+    """``training`` and its mirror image: left and right swapped, x negated (z if x is up).
 
-    Raises OptionError where no two points have names that differ in their side alone.
+    Raises OptionError where no two points have names that differ only in their side.
     """
-    order = mirror_order(found.names)
+    order = mirror_order(training.names)
     if order == list(range(len(order))):
         raise OptionError("no two points have names that differ in left and right alone")
-    axis = 2 if column_of(found.up) == 0 else 0
+    axis = 2 if column_of(training.up) == 0 else 0
     images = []
-    for clip in found.clips:
+    for clip in training.clips:
         image = clip[:, order]
         image[:, :, axis] *= -1
         images.append(image)
-    return replace(found, clips=(*found.clips, *images))
+    return replace(training, clips=(*training.clips, *images))
 
 
 def mirror_order(names: Sequence[str]) -> list[int]:
@@ -134,67 +133,70 @@ def mirror_order(names: Sequence[str]) -> list[int]:
     return order
 
 
-def with_headings(found: TrainingSet, n_turns: int) -> TrainingSet:
-    """``found`` in ``n_turns`` headings, 180 / ``n_turns`` degrees apart about the up axis.
+def with_headings(training: TrainingSet, n_turns: int) -> TrainingSet:
+    """``training`` in ``n_turns`` headings, 180 / ``n_turns`` degrees apart about the up axis.
 
-    Half a turn negates the coordinates, which no basis minds, so half a circle holds all headings.
+    Half a turn negates the coordinates, which does not affect bases, so half a circle covers all
+    headings.
     """
     if n_turns < 1:
         raise OptionError(f"{n_turns} headings; at least one is needed")
-    up = column_of(found.up)
+    up = column_of(training.up)
     a, b = (up + 1) % 3, (up + 2) % 3
     clips = []
     for turn in range(n_turns):
         angle = np.pi * turn / n_turns
-        for clip in found.clips:
+        for clip in training.clips:
             image = clip.copy()
             image[:, :, a] = np.cos(angle) * clip[:, :, a] - np.sin(angle) * clip[:, :, b]
             image[:, :, b] = np.sin(angle) * clip[:, :, a] + np.cos(angle) * clip[:, :, b]
             clips.append(image)
-    return replace(found, clips=tuple(clips))
+    return replace(training, clips=tuple(clips))
 
 
-def frames_of(found: TrainingSet, every: int = 1) -> Floats:
+def frames_of(training: TrainingSet, every: int = 1) -> Floats:
     """All frames of the clips, or every so many of each, (N, J, 3)."""
     if every < 1:
         raise OptionError(f"every {every} frames; 1 means all of them")
-    return np.concatenate([clip[::every] for clip in found.clips])
+    return np.concatenate([clip[::every] for clip in training.clips])
 
 
-def window_coefficients(found: TrainingSet, n_frames: int, n_kept: int) -> Floats:
+def window_coefficients(training: TrainingSet, n_frames: int, n_kept: int) -> Floats:
     """The first ``n_kept`` DCT coefficients of windows of ``n_frames``, as frames (N, J, 3).
 
-    What is left of a clip behind its last whole window is a window of its own, scaled by its own
-    length; of fewer frames than ``n_kept`` it has as many coefficients.
+    The rest of a clip after its last whole window is a shorter window, scaled by its own length; if
+    it has fewer frames than ``n_kept`` it has as many coefficients.
     """
     if n_frames < 1 or n_kept < 1:
         raise OptionError(f"windows of {n_frames} frames, {n_kept} coefficients of each")
     parts = []
-    for clip in found.clips:
+    for clip in training.clips:
         for start in range(0, len(clip), n_frames):
             window = clip[start : start + n_frames]
             parts.append(np.einsum("kf,fja->kja", dct_matrix(len(window))[:n_kept], window))
     return np.concatenate(parts)
 
 
-def steps(found: TrainingSet, n_frames: int, every: int = 1) -> Floats:
+def steps(training: TrainingSet, n_frames: int, every: int = 1) -> Floats:
     """Displacements of points in ``n_frames``, from every frame or every so many, (N, J, 3)."""
     if n_frames < 1 or every < 1:
         raise OptionError(f"steps of {n_frames} frames from every {every} frames")
-    return np.concatenate([(clip[n_frames:] - clip[:-n_frames])[::every] for clip in found.clips])
+    return np.concatenate(
+        [(clip[n_frames:] - clip[:-n_frames])[::every] for clip in training.clips]
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
     """Options of learning a basis; ``learn_basis`` has the first four.
 
-    ``kind``, one of ``KINDS``, is what is to become sparse: "frames" as they are, "steps" from one
-    to a later one, DCT coefficients of "windows". ``mirror`` and ``headings`` add mirrored and
-    turned copies of the clips; ``every`` takes every so many frames, or steps, alone.
+    ``kind``, one of ``KINDS``, is the data to make sparse: "frames" themselves, "steps" from one to
+    a later one, DCT coefficients of "windows". ``mirror`` and ``headings`` add mirrored and turned
+    copies of the clips; ``every`` uses only every so many frames, or steps.
 
-    Why steps? A codec codes what changes: differences of frames, or windows of which all but one
+    Why steps? A codec codes changes: differences of frames, or windows of which all but one
     coefficient in time are of movement. Bases learned from steps take fewer bits there at equal
-    error than those of the positions themselves, whose energy is where the figure stands.
+    error than bases of the positions themselves, whose energy is in the place of the figure.
     """
 
     sparsity: int = SPARSITY
@@ -206,26 +208,26 @@ class Recipe:
     headings: int = 1
     every: int = 1
 
-    def vectors(self, found: TrainingSet) -> Floats:
+    def vectors(self, training: TrainingSet) -> Floats:
         """Training vectors, (N, J, 3); raises OptionError for too short clips."""
         if self.mirror:
-            found = with_mirror_images(found)
-        found = with_headings(found, self.headings)
+            training = with_mirror_images(training)
+        training = with_headings(training, self.headings)
         if self.kind == "steps":
-            vectors = steps(found, STEP_FRAMES, self.every)
+            vectors = steps(training, STEP_FRAMES, self.every)
         elif self.kind == "windows":
-            vectors = window_coefficients(found, WINDOW_FRAMES, WINDOW_KEPT)
+            vectors = window_coefficients(training, WINDOW_FRAMES, WINDOW_KEPT)
         elif self.kind == "frames":
-            vectors = frames_of(found, self.every)
+            vectors = frames_of(training, self.every)
         else:
             raise OptionError(f"kind {self.kind!r} is not one of {', '.join(KINDS)}")
         if not len(vectors):
             raise OptionError(f"no clip is long enough for training on {self.kind}")
         return vectors
 
-    def learn(self, found: TrainingSet, progress: Progress | None = None) -> Trained:
-        """The bases of x, y and z; raises OptionError as ``learn_basis`` does."""
-        vectors = self.vectors(found)
+    def learn(self, training: TrainingSet, progress: Progress | None = None) -> Trained:
+        """The bases of x, y and z; raises OptionError as ``learn_basis``."""
+        vectors = self.vectors(training)
 
         def report(done: int, at_most: int) -> None:
             if progress is not None:
@@ -239,16 +241,17 @@ class Recipe:
             start=self.start,
             progress=report,
         )
-        return Trained(found, len(vectors), learned)
+        return Trained(training, len(vectors), learned)
 
 
-# Of the bases of this package, for which tools/train_lsdt.py tries several starts and growths.
+# Settings of the bases of this package, for which tools/train_lsdt.py tries several starts and
+# growths.
 SHIPPED = Recipe(kind="steps", mirror=True, headings=2, every=2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trained:
-    """Bases, one a coordinate, and what they were learned from."""
+    """Bases, one a coordinate, and their training set."""
 
     source: TrainingSet
     n_vectors: int
@@ -257,13 +260,13 @@ class Trained:
     @property
     def data(self) -> bytes:
         """The bases in integers, as the data of a model of SPEC.md, "Bases"."""
-        return build_bases([found.basis for found in self.learned])
+        return build_bases([learned.basis for learned in self.learned])
 
     def better(self, other: Trained) -> Trained:
         """Choose the better basis of each coordinate; raises OptionError if they do not compare.
 
-        Minima differ, even with growth, by some percent, and once in a while by more; which one is
-        reached hangs on the last digit of the start. So several are tried where it matters.
+        Minima differ, even with growth, by some percent, and occasionally by more; the last digit
+        of the start decides which one is reached. So several are tried where it matters.
         """
         if self.n_vectors != other.n_vectors or self.source.names != other.source.names:
             raise OptionError("bases that were learned from other vectors cannot be compared")
@@ -271,10 +274,10 @@ class Trained:
         best = (min(pair, key=lambda learned: float(learned.objective[-1])) for pair in pairs)
         return replace(self, learned=tuple(best))
 
-    def left_out(self, found: Learned) -> Floats:
+    def left_out(self, learned: Learned) -> Floats:
         """Rms residual of a point with the start and after each iteration, in units."""
         size = max(1, self.n_vectors * len(self.source.names))
-        return np.sqrt(found.objective / size)
+        return np.sqrt(learned.objective / size)
 
     def document(self) -> JsonObject:
         """For JSON and people; ``left_out`` is rms, at the start and after each iteration."""
@@ -288,12 +291,12 @@ class Trained:
             "unit": self.source.unit or "length units",
             "coordinates": [
                 {
-                    "iterations": found.n_iterations,
-                    "start": float(self.left_out(found)[0]),
-                    "end": float(self.left_out(found)[-1]),
-                    "left_out": self.left_out(found).tolist(),
+                    "iterations": learned.n_iterations,
+                    "start": float(self.left_out(learned)[0]),
+                    "end": float(self.left_out(learned)[-1]),
+                    "left_out": self.left_out(learned).tolist(),
                 }
-                for found in self.learned
+                for learned in self.learned
             ],
         }
 

@@ -1,7 +1,7 @@
-"""Every checksum of a file in one pass over its bytes, nothing decoded.
+"""Every checksum of a file in one pass over its bytes, without decoding.
 
-The pass runs at the speed of the disk, holds a block at a time, and goes on after a fault, so that
-all are named. SPEC.md, "Chunks", "Open DATA and packets", "INDX" and "FOOT", are normative.
+The pass runs at the speed of the disk, holds a block at a time, and continues after a fault to
+report all of them. SPEC.md, "Chunks", "Open DATA and packets", "INDX" and "FOOT", are normative.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mcz.container.grammar import INDEX, START, ChunkEvent, Event, Fault, Packet
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import index_limit
 from mcz.container.packets import END
-from mcz.container.parser import ALL, Parser
+from mcz.container.parser import WHOLE, Parser
 from mcz.container.parser_drivers import events
 from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, UnsupportedError
@@ -35,7 +35,7 @@ Report = Callable[[int, int], object]
 class ChecksumReport:
     """Findings of one pass; ``faults``: the place and kind of each, in file order.
 
-    ``indexed``: whether the file ends with an INDX, which was compared with what is there.
+    ``indexed``: the file ends with an INDX, which was compared with the chunks.
     """
 
     n_chunks: int = 0
@@ -45,12 +45,11 @@ class ChecksumReport:
 
 
 def check_checksums(source: ByteSource, progress: Report | None = None) -> ChecksumReport:
-    """Check each checksum of ``source``, and INDX and FOOT against the chunks that are there.
+    """Check each checksum of ``source``, and compare INDX and FOOT with the chunks.
 
-    Nothing is decoded: only a full check finds what is wrong within sound checksums. ``progress``
-    is called with the bytes that are done and those of the file.
-    Raises UnsupportedError where the file needs a newer reader, AccessError where it cannot be
-    read.
+    Nothing is decoded: only a full check finds faults within sound checksums. ``progress`` is
+    called with the number of bytes done and the size of the file. Raises UnsupportedError where the
+    file needs a newer reader, AccessError where it cannot be read.
     """
     check = _Check(source)
     for event in events(source, check.parser):
@@ -64,15 +63,15 @@ def check_checksums(source: ByteSource, progress: Report | None = None) -> Check
 class _Check:
     def __init__(self, source: ByteSource) -> None:
         self._source = source
-        self.parser = Parser(source.size, want=lambda chunk: ALL * (chunk.type in KEPT))
+        self.parser = Parser(source.size, want=lambda chunk: WHOLE * (chunk.type in KEPT))
         self.seen = ChecksumReport()
         self._places = _Places()
         self._index: Chunk | None = None  # that the last FOOT closes
         self._end = 0  # of the last FOOT
-        self._has_lost = False  # some of what is there is not known
+        self._has_lost = False  # an unknown part of the file was passed
 
     def take(self, event: Event) -> None:
-        """Take an event in; raises UnsupportedError."""
+        """Process an event; raises UnsupportedError."""
         if isinstance(event, PacketEvent):
             self._take_packet(event)
         elif isinstance(event, Fault):
@@ -86,7 +85,7 @@ class _Check:
         self.seen.faults.append((at, text))
 
     def _take_fault(self, fault: Fault) -> None:
-        """Note a fault of a checksum, or of the grammar where all that lies before is known."""
+        """Note a fault of a checksum, or of the grammar if everything before is known."""
         event, chunk = fault.event, fault.chunk
         if isinstance(fault.error, UnsupportedError):
             raise fault.error
@@ -118,7 +117,7 @@ class _Check:
             except FormatError as error:
                 self._note(chunk.offset, str(error))
         elif chunk.type in SHARED:
-            with suppress(FormatError):  # its content is not looked at here
+            with suppress(FormatError):  # its content is not checked here
                 id_ = chunk_id(chunk.type, event.payload, self.parser.profile)
                 self._places.shared.setdefault((chunk.type, id_), chunk)
         self._places.add(chunk)
@@ -131,7 +130,7 @@ class _Check:
                 self._places.clips[-1].segment(event.body, len(packet.body), packet.kind)
 
     def finish(self) -> None:
-        """Compare the last index with what is there, where all of it is known."""
+        """Compare the last index with the file, if all of the file is known."""
         size, index = self._source.size, self._index
         if self._end != size:
             self._note(size, f"the file ends at {size} without a FOOT")
@@ -140,10 +139,10 @@ class _Check:
                 listed = read_indexes(
                     self._source.read, index.offset, index.size, index_limit(size)
                 )
-                found = self._places.differences(directory_of(listed))
+                faults = self._places.differences(directory_of(listed))
             except FormatError as error:
-                found = [str(error)]
-            for text in found:
+                faults = [str(error)]
+            for text in faults:
                 self._note(index.offset, f"chunk {index.label}: {text}")
             self.seen.indexed = True
 
@@ -159,15 +158,13 @@ class _ClipPlaces:
     ancillary: list[Chunk] = field(default_factory=list)
 
     def segment(self, offset: int, size: int, packet: int = 0) -> None:
-        """Add a segment; ``packet`` is the kind of its packet, as of ``SegmentRow``."""
+        """Add a segment; ``packet`` is the kind of its packet, as in ``SegmentRow``."""
         self.n_segments += 1
         self.segments = zlib.crc32(_PLACE.pack(offset, size, packet), self.segments)
 
 
 @dataclass(slots=True)
 class _Places:
-    """The chunks of a file, in file order."""
-
     head: bytes = b""
     shared: dict[tuple[bytes, bytes], Chunk] = field(default_factory=dict)
     attachments: list[Chunk] = field(default_factory=list)
@@ -175,7 +172,7 @@ class _Places:
     clips: list[_ClipPlaces] = field(default_factory=list)
 
     def add(self, chunk: Chunk) -> None:
-        """Take in the next chunk, whatever it is; those in ``shared`` come by themselves."""
+        """Add the next chunk of any type; chunks of ``shared`` are added separately."""
         clip = self.clips[-1] if self.clips else None
         if chunk.type == ChunkType.CLIP:
             self.clips.append(_ClipPlaces(chunk))
@@ -193,17 +190,17 @@ class _Places:
             clip.ancillary.append(chunk)
 
     def differences(self, listed: Directory) -> list[str]:
-        """The faults of an index, in words; empty where it is right."""
-        found = []
+        """The faults of an index, in words; empty if it is right."""
+        faults = []
         if listed.head != self.head:
-            found.append("its copy of HEAD differs from HEAD")
+            faults.append("its copy of HEAD differs from HEAD")
         if list(listed.shared.items()) != list(self.shared.items()):
-            found.append("it lists other skeletons, models or sources than there are")
+            faults.append("it lists other skeletons, models or sources than there are")
         if [part for row in listed.attachments.values() for part in row.parts] != self.attachments:
-            found.append("it lists other attachments than there are")
+            faults.append("it lists other attachments than there are")
         if self.n_aliases != len(listed.aliases):
-            found.append(f"it lists {len(listed.aliases)} aliases, there are {self.n_aliases}")
-        return found + _clip_differences(self.clips, list(listed.clips.values()))
+            faults.append(f"it lists {len(listed.aliases)} aliases, there are {self.n_aliases}")
+        return faults + _clip_differences(self.clips, list(listed.clips.values()))
 
 
 def _clip_differences(places: Sequence[_ClipPlaces], rows: Sequence[ClipRow]) -> list[str]:
@@ -217,7 +214,7 @@ def _clip_differences(places: Sequence[_ClipPlaces], rows: Sequence[ClipRow]) ->
 
 
 def places_of(row: ClipRow) -> _ClipPlaces:
-    """Places of a clip as an index lists them; raises FormatError for a wrong index."""
+    """Places of a clip as listed by an index; raises FormatError for a wrong index."""
     places = _ClipPlaces(row.clip, cend=row.cend, ancillary=row.ancillary)
     for segment in row.segments:
         places.segment(segment.offset, segment.size, segment.packet)

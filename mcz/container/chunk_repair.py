@@ -17,7 +17,7 @@ from mcz.container.chunks import (
     Chunk,
     ChunkType,
     build_chunk,
-    parse_header,
+    parse_chunk_header,
     read_chunk,
     read_payload,
 )
@@ -37,34 +37,34 @@ MOST_READ = 4  # times the bytes of a file, in search of a bit
 
 
 def scan_for_salvage(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
-    """A damaged file with what can be put right in it, a salvaging scan of it, and what was wrong.
+    """A damaged file with all possible repairs, a salvaging scan of it, and its faults.
 
-    Raises FormatError where no chunk is whole.
+    Raises FormatError if no chunk is intact.
     """
-    found = scan(source, salvage=True)
-    better, notes = restore_chunks(source, found)
+    scanned = scan(source, salvage=True)
+    better, notes = restore_chunks(source, scanned)
     if better is not None:  # SALV-06
-        source, found = better, scan(better, salvage=True)
-    if found.doubts and (owners := owners_of(source, found)):
-        found = scan(source, salvage=True, owners=owners)
-    notes += restore_from_index(source, found)
-    if not found.chunks:
+        source, scanned = better, scan(better, salvage=True)
+    if scanned.doubts and (owners := owners_of(source, scanned)):
+        scanned = scan(source, salvage=True, owners=owners)
+    notes += restore_from_index(source, scanned)
+    if not scanned.chunks:
         raise FormatError("nothing can be salvaged: no chunk is whole")
-    return source, found, notes
+    return source, scanned, notes
 
 
-def restore_chunks(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str]]:
-    """``source`` with the damaged chunks of which it has copies, None where nothing is to be done.
+def restore_chunks(source: ByteSource, scanned: Found) -> tuple[Overlay | None, list[str]]:
+    """``source`` with its damaged chunks restored from copies, None if none can be.
 
-    ``found`` is what a salvaging scan of ``source`` has found. Also returns what was wrong with
-    each of these chunks, and with copies that cannot be used.
+    ``scanned`` is the result of a salvaging scan of ``source``. Also returns the fault of each of
+    these chunks, and of copies that cannot be used.
     """
-    if not found.damage:
+    if not scanned.damage:
         return None, []
     notes: list[str] = []
-    sound = _sound_spans(found)
+    sound = _sound_spans(scanned)
     parts: dict[int, bytes] = {}
-    for copy, shift in _shift_copies(source, found, list(_read_copies(source, found, notes))):
+    for copy, shift in _shift_copies(source, scanned, list(_read_copies(source, scanned, notes))):
         if shift is None:
             notes.append(f"a copy of {copy.label} is not used: where it belongs is not clear")
             continue
@@ -80,24 +80,24 @@ def restore_chunks(source: ByteSource, found: Found) -> tuple[Overlay | None, li
             continue
         notes.append(f"{copy.label}: {fault}; its copy is used")  # SALV-07
         parts[copy.offset] = chunk
-    for offset, header in _mend_headers(source, found):
+    for offset, header in _mend_headers(source, scanned):
         if not any(at <= offset < at + len(part) for at, part in parts.items()):
             notes.append(f"chunk at {offset}: one bit of its header is wrong, and put right")
             parts[offset] = header
     return (Overlay(source, parts) if parts else None), notes
 
 
-def _mend_headers(source: ByteSource, found: Found) -> Iterator[tuple[int, bytes]]:
-    """The headers of which one bit is wrong: with that turned both of a chunk's checks hold."""
+def _mend_headers(source: ByteSource, scanned: Found) -> Iterator[tuple[int, bytes]]:
+    """Headers with a single bit flipped back, with which both checks of the chunk hold."""
     left = MOST_READ * source.size
-    for offset, chunk in found.broken:
+    for offset, chunk in scanned.broken:
         if chunk is None and offset + HEADER.size <= source.size:
             given = int.from_bytes(source.read(offset, HEADER.size), "little")
             for bit in range(8 * HEADER.size):
                 header = (given ^ 1 << bit).to_bytes(HEADER.size, "little")
                 with suppress(FormatError):
-                    mended = parse_header(header, offset)
-                    if mended.type == ChunkType.COPY:  # those are made anew
+                    mended = parse_chunk_header(header, offset)
+                    if mended.type == ChunkType.COPY:  # copies are written again
                         continue
                     left -= HEADER.size if mended.length is None else mended.size
                     if left < 0:
@@ -117,15 +117,15 @@ def _check_whole(source: ByteSource, chunk: Chunk) -> None:
 
 
 def _shift_copies(
-    source: ByteSource, found: Found, copies: list[Copy]
+    source: ByteSource, scanned: Found, copies: list[Copy]
 ) -> Iterator[tuple[Copy, int | None]]:
-    """Each copy, and by how much what it is of lies elsewhere than it says.
+    """Each copy, and the shift of its original from the stated offset.
 
-    Bytes that were put in or cut out before a COPY shift all that it says. The copied chunks that
-    are whole tell it, for the damaged ones between them, too; None where they do not agree.
+    Bytes that were inserted or cut out before a COPY shift all of its offsets. Intact copied chunks
+    show the shift, also for the damaged ones between them; None where they do not agree.
     """
     places: dict[tuple[bytes, int | None, bytes], list[int]] = {}
-    for one in found.chunks:
+    for one in scanned.chunks:
         if one.type in COPIED:
             crc = source.read(one.offset + one.size - CRC.size, CRC.size)
             places.setdefault((one.type, one.length, crc), []).append(one.offset)
@@ -142,17 +142,16 @@ def _shift_copies(
 
 
 def _fill_forward(known: list[int | None]) -> list[int | None]:
-    """Each number that is known, or the last one before it."""
-    found: list[int | None] = []
+    filled: list[int | None] = []
     for one in known:
-        found.append(one if one is not None or not found else found[-1])
-    return found
+        filled.append(one if one is not None or not filled else filled[-1])
+    return filled
 
 
-def _read_copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator[Copy]:
-    """The copies in every COPY that is whole; together they are no longer than the file."""
+def _read_copies(source: ByteSource, scanned: Found, notes: list[str]) -> Iterator[Copy]:
+    """The copies in every intact COPY; together they are not longer than the file."""
     left = source.size
-    for chunk in found.chunks:
+    for chunk in scanned.chunks:
         if chunk.type != ChunkType.COPY:
             continue
         try:
@@ -164,9 +163,9 @@ def _read_copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator
         yield from copies
 
 
-def _sound_spans(found: Found) -> list[tuple[int, int]]:
-    feet = [(at, at + FOOT.size) for at in found.feet]
-    return sorted(feet + [(chunk.offset, _end_of(chunk, found)) for chunk in found.chunks])
+def _sound_spans(scanned: Found) -> list[tuple[int, int]]:
+    feet = [(at, at + FOOT.size) for at in scanned.feet]
+    return sorted(feet + [(chunk.offset, _end_of(chunk, scanned)) for chunk in scanned.chunks])
 
 
 def _overlaps(spans: list[tuple[int, int]], start: int, stop: int) -> bool:
@@ -174,8 +173,8 @@ def _overlaps(spans: list[tuple[int, int]], start: int, stop: int) -> bool:
     return any(a < stop and start < b for a, b in spans[max(0, index - 1) : index + 1])
 
 
-def _end_of(chunk: Chunk, found: Found) -> int:
-    return found.ends[chunk.offset] if chunk.length is None else chunk.offset + chunk.size
+def _end_of(chunk: Chunk, scanned: Found) -> int:
+    return scanned.ends[chunk.offset] if chunk.length is None else chunk.offset + chunk.size
 
 
 def _fault_of(source: ByteSource, copy: Copy) -> str:
@@ -187,9 +186,9 @@ def _fault_of(source: ByteSource, copy: Copy) -> str:
     return ""
 
 
-def owners_of(source: ByteSource, found: Found) -> dict[tuple[int, int], str]:
-    """Whose the segments and CENDs are, as the last index says that is whole; see ``scan``."""
-    listed = _read_last_index(source, found)
+def owners_of(source: ByteSource, scanned: Found) -> dict[tuple[int, int], str]:
+    """Owners of segments and CENDs, from the last intact index; see ``scan``."""
+    listed = _read_last_index(source, scanned)
     owners: dict[tuple[int, int], str] = {}
     with suppress(FormatError):
         for name, clip in listed.clips.items() if listed is not None else ():
@@ -199,9 +198,9 @@ def owners_of(source: ByteSource, found: Found) -> dict[tuple[int, int], str]:
     return owners
 
 
-def _read_last_index(source: ByteSource, found: Found) -> Directory | None:
-    """The content of the last whole INDX, and of those that it continues up to a damaged one."""
-    for chunk in reversed(found.chunks):
+def _read_last_index(source: ByteSource, scanned: Found) -> Directory | None:
+    """The content of the last intact INDX, and of those that it continues up to a damaged one."""
+    for chunk in reversed(scanned.chunks):
         if chunk.type == ChunkType.INDX:
             whole: list[Listed] = []
             with suppress(FormatError):
@@ -213,13 +212,13 @@ def _read_last_index(source: ByteSource, found: Found) -> Directory | None:
     return None
 
 
-def restore_from_index(source: ByteSource, found: Found) -> list[str]:
-    """Let a salvaged file have HEAD and aliases that are lost from the last index that is whole.
+def restore_from_index(source: ByteSource, scanned: Found) -> list[str]:
+    """Restore the lost HEAD and aliases of a salvaged file from the last intact index.
 
-    Without one it gets the HEAD of this version. Returns what was lost.
+    Without an index it gets the HEAD of this version. Returns the lost parts.
     """
-    directory, notes = found.directory, []
-    listed = _read_last_index(source, found)
+    directory, notes = scanned.directory, []
+    listed = _read_last_index(source, scanned)
     if listed is not None and not directory.head:
         with suppress(FormatError):
             parse_head(listed.head)
@@ -231,7 +230,7 @@ def restore_from_index(source: ByteSource, found: Found) -> list[str]:
             notes.append(f"the alias {name!r} is lost; it is taken from the index")
             record = payloads.Alia(name=name, of=of, target=target)
             alias = build_chunk(ChunkType.ALIA, build(record, "ALIA"))
-            found.broken = [b for b in found.broken if not is_like(source, b[0], alias)]
+            scanned.broken = [b for b in scanned.broken if not is_like(source, b[0], alias)]
     if not directory.head:
         notes.append("no HEAD; the file is read as one of this version")
         directory.head = build_head(BASE)
@@ -239,6 +238,6 @@ def restore_from_index(source: ByteSource, found: Found) -> list[str]:
 
 
 def is_like(source: ByteSource, offset: int, chunk: bytes) -> bool:
-    """Return True if most bytes of ``chunk`` stand at ``offset``, though damaged."""
+    """Return True if most bytes at ``offset`` equal those of ``chunk``."""
     there = source.read(offset, max(0, min(len(chunk), source.size - offset)))
     return bool(4 * sum(map(eq, there, chunk)) >= 3 * len(chunk))

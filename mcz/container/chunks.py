@@ -24,8 +24,8 @@ OPEN_LENGTH = 2**64 - 1
 
 
 class ChunkFlag(IntFlag):
-    ANCILLARY = 1  # a reader that does not know the type skips the chunk
-    SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
+    ANCILLARY = 1  # readers skip the chunk if its type is unknown
+    SAFE_TO_COPY = 2  # rewriters keep the chunk if its type is unknown
 
 
 # An int, since ~ of a ChunkFlag has no other bits.
@@ -53,22 +53,22 @@ class ChunkType(bytes, Enum):
 
 
 # CHUNK-16, CHUNK-17, CHUNK-18, CHUNK-19, CHUNK-20, CHUNK-21
-FLAGS_OF: dict[bytes, ChunkFlag] = {  # of those that are not critical
+FLAGS_OF: dict[bytes, ChunkFlag] = {  # of chunks that are not critical
     ChunkType.INDX: ChunkFlag.ANCILLARY,
     ChunkType.QUAL: ChunkFlag.ANCILLARY | ChunkFlag.SAFE_TO_COPY,
     ChunkType.REPT: ChunkFlag.ANCILLARY,
-    ChunkType.COPY: ChunkFlag.ANCILLARY,  # what it says is true of this file alone
+    ChunkType.COPY: ChunkFlag.ANCILLARY,  # its content is true of this file alone
     ChunkType.META: ChunkFlag.ANCILLARY | ChunkFlag.SAFE_TO_COPY,
     ChunkType.RECV: ChunkFlag.ANCILLARY,
 }
-# The chunks that a REPT holds again, and those of a COPY.
+# The chunks repeated by a REPT, and by a COPY.
 REPEATED = (ChunkType.HEAD, ChunkType.SKEL, ChunkType.MODL, ChunkType.CLIP)
 COPIED = (*REPEATED, ChunkType.SRCE, ChunkType.ALIA, ChunkType.CEND)
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """A chunk's place in a file; ``length`` is that of its payload, None while it is open."""
+    """A chunk's place in a file; ``length`` is its payload's, None while it is open."""
 
     type: bytes
     flags: int = field(compare=False)
@@ -114,8 +114,8 @@ def build_chunk(kind: bytes, payload: bytes, flags: int = 0) -> bytes:
     return header + payload + CRC.pack(zlib.crc32(payload, zlib.crc32(header)))
 
 
-def parse_header(data: bytes, offset: int) -> Chunk:
-    """The chunk whose header is ``data``, which was read at ``offset``."""
+def parse_chunk_header(data: bytes, offset: int) -> Chunk:
+    """The chunk with the header ``data``, which was read at ``offset``."""
     if len(data) < HEADER.size:
         raise TruncatedError(
             f"a chunk header at {offset} ends after {len(data)} of 16 bytes", offset=offset
@@ -158,7 +158,7 @@ def read_chunk(source: ByteSource, offset: int) -> Chunk:
         raise TruncatedError(
             f"the file ends at {source.size}, in a chunk header at {offset}", offset=offset
         )
-    chunk = parse_header(source.read(offset, HEADER.size), offset)
+    chunk = parse_chunk_header(source.read(offset, HEADER.size), offset)
     if chunk.length is not None and chunk.offset + chunk.size > source.size:  # CHUNK-05
         raise TruncatedError(
             f"chunk {chunk.label} ends at {chunk.offset + chunk.size}, the file at {source.size}",
@@ -182,18 +182,18 @@ def read_payload(source: ByteSource, chunk: Chunk, limit: int) -> bytes:
 
 
 def check_chunk(data: bytes, chunk: Chunk) -> bytes:
-    """The payload in ``data``, the bytes of the whole ``chunk``, after its crc was checked."""
-    found = parse_header(data, chunk.offset)
+    """The payload in ``data``, the bytes of the whole ``chunk``, after a check of its crc."""
+    parsed = parse_chunk_header(data, chunk.offset)
     if chunk.length is None or len(data) != chunk.size:
         raise FormatError(f"chunk {chunk.label} is not whole", offset=chunk.offset)
-    if (found.type, found.length) != (chunk.type, chunk.length):
-        raise FormatError(f"chunk {chunk.label} is not what the index says", offset=chunk.offset)
+    if (parsed.type, parsed.length) != (chunk.type, chunk.length):
+        raise FormatError(f"chunk {chunk.label} differs from the index", offset=chunk.offset)
     check_crc(chunk, zlib.crc32(memoryview(data)[: -CRC.size]), data[-CRC.size :])
     return data[HEADER.size : -CRC.size]
 
 
 def check_crc(chunk: Chunk, computed: int, crc: bytes) -> None:
-    """Raise ChecksumError where the ``crc`` of a chunk is not the one that was computed."""
+    """Raise ChecksumError if the ``crc`` of a chunk differs from the computed one."""
     (stored,) = CRC.unpack(crc)
     if stored != computed:  # CHUNK-03
         raise ChecksumError(
@@ -238,7 +238,7 @@ def check_signature(source: ByteSource) -> None:
 
 
 def check_signature_in(data: bytes) -> None:
-    """Raise FormatError unless a file that begins with ``data`` begins as it must."""
+    """Raise FormatError unless ``data`` begins with the signature of a file."""
     if not data:
         raise TruncatedError("the file is empty")
     if data != SIGNATURE[: len(data)]:  # CHUNK-01

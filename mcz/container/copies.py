@@ -1,4 +1,4 @@
-"""Chunks that stand in a file a second time, so that a flipped bit in the first costs nothing.
+"""Second copies of chunks in a file, so that a flipped bit in the first costs nothing.
 
 SPEC.md, "COPY", is normative.
 """
@@ -20,8 +20,8 @@ from mcz.container.source import ByteSource
 from mcz.errors import FormatError
 from mcz.model.schema import build, deflate, parse, parse_all
 
-MOST_BYTES = 64 * 1024  # of the copies in one COPY, decoded, so that a bad byte costs no more
-SMALL_PART = 64  # a model is copied where the file has this many times its bytes
+MOST_BYTES = 64 * 1024  # decoded bytes of the copies in one COPY, so that a bad byte costs no more
+SMALL_PART = 64  # a model is copied if the file has this many times its bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Copy:
 
     @property
     def chunk(self) -> bytes:
-        """The whole chunk as it was: types that may be copied have no flags."""
+        """The original chunk: types that may be copied have no flags."""
         return build_chunk(self.type, self.payload)
 
     @property
@@ -47,7 +47,7 @@ class Copy:
 
 
 def group_copies(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
-    """``copies``, those of one COPY at a time."""
+    """``copies`` in groups, one for each COPY."""
     run: list[Copy] = []
     size = 0
     for copy in copies:
@@ -61,7 +61,7 @@ def group_copies(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
 
 
 def is_worth_copying(copy: Copy, n_bytes: int) -> bool:
-    """Return True if a copy pays in a file of ``n_bytes``: one of a large model does not."""
+    """Return True if a copy is worthwhile in a file of ``n_bytes``: not one of a large model."""
     return copy.type != ChunkType.MODL or len(copy.payload) * SMALL_PART <= n_bytes
 
 
@@ -79,7 +79,7 @@ def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
 
 
 def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
-    """The copies in ``payload``, that of the COPY ``chunk``; they decode to ``limit`` at most.
+    """The copies in ``payload``, of the COPY ``chunk``; they decode to ``limit`` at most.
 
     Raises FormatError where they are not in file order, or not before the COPY.
     """
@@ -118,7 +118,7 @@ def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
 def find_uncopied(
     source: ByteSource, directory: Directory, payload_of: Callable[[Chunk], bytes]
 ) -> list[Copy]:
-    """Copies of the chunks behind the last COPY of a file; of aliases the directory knows none."""
+    """Copies of the chunks after the last COPY of a file; of aliases the directory has none."""
     copies = copy_chunks(source, directory)
     last = copies[-1].offset if copies else 0
     later = [
@@ -140,10 +140,10 @@ def check_copies(
     before: Sequence[Chunk],
     payload_of: Callable[[Chunk], bytes],
 ) -> None:
-    """Compare what the COPY ``chunk`` says with the chunks ``before`` it, in file order."""
+    """Compare the COPY ``chunk`` with the chunks ``before`` it, in file order."""
     for copy in copies:
         at = bisect_left(before, copy.offset, key=lambda other: other.offset)
         there = before[at] if at < len(before) else None
         same = there is not None and (there.offset, there.type) == (copy.offset, copy.type)
         if there is None or not same or payload_of(there) != copy.payload:  # COPY-02
-            raise FormatError(f"no {copy.label} is as its copy says", where=f"chunk {chunk.label}")
+            raise FormatError(f"no {copy.label} is equal to its copy", where=f"chunk {chunk.label}")

@@ -29,7 +29,7 @@ class Run(NamedTuple):
 
 
 class DecodedCache:
-    """Runs by key, those that were used last: at most ``most_bytes`` of a file."""
+    """Runs by key, the last used ones: at most ``most_bytes`` of a file."""
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
         self._most = most_bytes
@@ -44,7 +44,7 @@ class DecodedCache:
             return self._runs.get(key)
 
     def put(self, key: Hashable, run: Run) -> None:
-        """Keep a run, which nobody may change any more, in place of older ones."""
+        """Keep a run, which must not be changed any more, in place of older ones."""
         with self._lock:
             if key not in self._runs:
                 self._runs[key] = run

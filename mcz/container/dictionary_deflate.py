@@ -25,7 +25,7 @@ PACKED = 2  # bit 1 of the flags of SKEL
 
 @cache
 def words() -> bytes:
-    """The annex to which distances may reach back."""
+    """The annex that serves as a dictionary of deflate."""
     return annex_bytes("words.bin")
 
 
@@ -43,7 +43,7 @@ def encode_smallest(data: bytes, *, short: bool, plain: bool = False) -> tuple[i
 
 
 def decode_data(data: bytes, flags: int, size: int, where: str) -> bytes:
-    """The ``size`` bytes that SRCE, ATTA, COPY and META hold as ``data``."""
+    """The ``size`` bytes that SRCE, ATTA, COPY and META store as ``data``."""
     encoding = flags & payloads.ENCODING
     if encoding == payloads.STORED:
         if len(data) != size:  # ATTA-03, SRCE-01
@@ -56,9 +56,9 @@ def decode_data(data: bytes, flags: int, size: int, where: str) -> bytes:
 def plain_payload(
     kind: bytes, payload: bytes, where: str, profile: Profile, most: int | None = None
 ) -> bytes:
-    """The payload of a SKEL, MODL or SRCE that says the same uncompressed.
+    """The equivalent uncompressed payload of a SKEL, MODL or SRCE.
 
-    ``most``: the bytes that a template may decode to. Raises FormatError.
+    ``most``: greatest decoded size of a template. Raises FormatError.
     """
     if kind == ChunkType.SKEL:
         return unpack_skeleton(payload, where, profile)
@@ -75,17 +75,17 @@ def plain_payload(
 
 
 def plain_id(kind: bytes, plain: bytes) -> bytes:
-    """The id of a chunk with this payload, which is not compressed."""
+    """The id of a chunk with this uncompressed payload."""
     return hashlib.sha256(kind + plain).digest()[:16]
 
 
 def chunk_id(kind: bytes, payload: bytes, profile: Profile = LARGE) -> bytes:
-    """The id of a SKEL, MODL or SRCE; raises FormatError where it cannot be inflated."""
+    """The id of a SKEL, MODL or SRCE; raises FormatError if it cannot be inflated."""
     return plain_id(kind, plain_payload(kind, payload, kind.decode(), profile))
 
 
 class PackedSkel(Record):
-    """SKEL up to its flags, and what follows them, perhaps packed."""
+    """SKEL up to its flags, and the rest, perhaps packed."""
 
     name: str = field(TEXT, "name of the skeleton")
     flags: int = field(Int8ul, "bit 1: packed")
@@ -94,7 +94,7 @@ class PackedSkel(Record):
 
 
 def pack_skeleton(payload: bytes) -> bytes:
-    """The payload of a SKEL with its fields packed, where that is shorter."""
+    """The payload of a SKEL with its fields packed, if that is shorter."""
     plain = parse(PackedSkel, payload, "SKEL")
     flags, data = plain.flags | PACKED, deflate(plain.rest, words=words())
     packed = PackedSkel(name=plain.name, flags=flags, size=len(plain.rest), rest=data)
@@ -106,7 +106,7 @@ def is_packed(payload: bytes, where: str) -> bool:
 
 
 def unpack_skeleton(payload: bytes, where: str, profile: Profile) -> bytes:
-    """The payload of a SKEL without packing; one that was never packed as it is."""
+    """The payload of a SKEL without packing."""
     packed = parse(PackedSkel, payload, where)
     if packed.size is None:
         return payload

@@ -17,17 +17,17 @@ from mcz.model.schema import MAX_COUNT, parse
 
 @dataclass(frozen=True, slots=True)
 class SegmentRow:
-    """One segment: where its payload lies, and what it covers.
+    """One segment: the place of its payload, and its frames.
 
-    ``packet`` is the kind of its packet, 0 where it is a closed DATA. The payload of a packet of
-    kind 2 is a stream without a table; ``told`` is the segment whose mask it has, None without one.
+    ``packet`` is the kind of its packet, 0 for a closed DATA. The payload of a packet of kind 2 is
+    a stream without a table; ``mask_row`` is the segment with its mask, None without one.
     """
 
     offset: int
     size: int
     header: SegmentHeader
     packet: int = 0
-    told: SegmentRow | None = None
+    mask_row: SegmentRow | None = None
 
     @property
     def stop(self) -> int:
@@ -67,7 +67,7 @@ class SignalRow:
         return cls(n_channels, signal.samples_per_frame, *cut, *codec)
 
     def stored(self, n_frames: int) -> int:
-        """The frames that the segments of the signal cover, where the clip has ``n_frames``."""
+        """The frames that the segments of the signal cover in a clip of ``n_frames``."""
         return self.skip + n_frames + self.spare
 
 
@@ -83,7 +83,7 @@ Place = tuple[int, int, int, int]  # offset and bytes of CLIP, and those of CEND
 
 @dataclass(slots=True, eq=False)
 class ClipRow:
-    """A clip as a listing shows it; its CLIP and CEND say more."""
+    """A clip as listed; its CLIP and CEND contain more."""
 
     name: str
     skeleton: bytes
@@ -99,14 +99,14 @@ class ClipRow:
 
     @classmethod
     def of(cls, fields: payloads.Clip, chunk: Chunk) -> ClipRow:
-        """The row of a clip of which nothing but its CLIP is known; raises FormatError."""
+        """The row of a clip from its CLIP alone; raises FormatError."""
         rate = fields.rate_numerator, fields.rate_denominator
         signals = signal_rows(fields, chunk.label)
         return cls(fields.name, fields.skeleton, fields.n_frames, *rate, signals, chunk)
 
     @property
     def packed(self) -> Packed | None:
-        """The segments as an index has them, while they were not unpacked."""
+        """The segments as in an index, while they are not unpacked."""
         return None
 
     def __eq__(self, other: object) -> bool:
@@ -121,13 +121,13 @@ class ClipRow:
         """The frames that it shows without CEND: up to the last segment of each signal."""
         n_frames = 0
         for stop, row in zip(stops, self.signals, strict=True):
-            most = self.n_frames if row.skip or row.spare else stop  # those after are spare
+            most = self.n_frames if row.skip or row.spare else stop  # the later ones are spare
             n_frames = max(n_frames, min(stop - row.skip, most))
         return n_frames
 
 
 class PackedClipRow(ClipRow):
-    """A row of an index, whose ``segments`` stay packed until they are asked for.
+    """A row of an index, whose ``segments`` stay packed until first use.
 
     They raise FormatError where the index is wrong.
     """
@@ -137,7 +137,7 @@ class PackedClipRow(ClipRow):
     def keep_packed(
         self, pack: Callable[[], Packed], unpack: Callable[[ClipRow, Packed], list[SegmentRow]]
     ) -> None:
-        """Let segments be what ``unpack`` makes of what ``pack`` returns."""
+        """Unpack segments on first use by ``unpack``, from the result of ``pack``."""
         self._pack: Callable[[], Packed] | None = pack
         self._unpack = unpack
 
@@ -158,10 +158,10 @@ class PackedClipRow(ClipRow):
 
 
 class ClipRows(MutableMapping[str, ClipRow]):
-    """Rows by name, in file order; those of an index are made when they are asked for.
+    """Rows by name, in file order; rows of an index are created on first use.
 
-    ``make`` makes the row of a number, ``having`` are the numbers of clips with a type of ancillary
-    chunks, and ``listed`` has the place of each, see ``places``.
+    ``make`` creates a row by its number, ``having`` lists the numbers of clips with a type of
+    ancillary chunks, and ``listed`` has the place of each, see ``places``.
     """
 
     def __init__(
@@ -201,7 +201,7 @@ class ClipRows(MutableMapping[str, ClipRow]):
 
     @property
     def last(self) -> ClipRow | None:
-        """The row of the clip that came last, None without one."""
+        """The row of the last clip, None without one."""
         name = next(reversed(self._rows), None)
         return None if name is None else self[name]
 
@@ -212,13 +212,13 @@ class ClipRows(MutableMapping[str, ClipRow]):
         return twin
 
     def ancillary(self, kind: bytes) -> list[Chunk]:
-        """The ancillary chunks of a type; no other row is made for it."""
+        """The ancillary chunks of a type; no other rows are created."""
         few = set(self._having(kind)) if self._having is not None else ()
         names = [n for n, row in self._rows.items() if not isinstance(row, int) or row in few]
         return [chunk for name in names for chunk in self[name].ancillary if chunk.type == kind]
 
     def places(self) -> Iterator[tuple[str, int, int, int, int]]:
-        """Name and place of each clip; no row is made for it."""
+        """Name and place of each clip; no rows are created."""
         listed = self._listed()
         for name, row in self._rows.items():
             if isinstance(row, int):
@@ -237,9 +237,9 @@ class AttachmentRow:
 
 @dataclass(frozen=True, slots=True)
 class IndexPlace:
-    """An INDX of a file, and how many things it and those before it list.
+    """An INDX of a file, and the number of things up to its end.
 
-    ``n_bytes`` of its content say how much it lists alone.
+    ``n_bytes`` of its content indicate how much it lists alone.
     """
 
     chunk: PreviousIndex  # how one that continues it names it
@@ -280,10 +280,10 @@ def parse_head(payload: bytes) -> Profile:
 
 
 def parse_clip(payload: bytes, head: bytes, where: str) -> payloads.Clip:
-    """The fields of CLIP, which needs no more than ``head``, the payload of HEAD, says."""
+    """The fields of CLIP, which must not need more than ``head``, the payload of HEAD, states."""
     needed, stated = tuple(payload[:2]), tuple(head[2:4])
     if stated and needed > stated:  # CLIP-22
-        raise FormatError(f"it needs format {needed}, more than HEAD says: {stated}", where=where)
+        raise FormatError(f"it needs format {needed}, HEAD states {stated}", where=where)
     return parse(payloads.Clip, payload, where)
 
 
@@ -296,6 +296,6 @@ class Found:
     feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
     damage: list[str] = field(default_factory=list)
     ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
-    # What salvage could not take in: its offset, and the chunk where its header is sound.
+    # Parts that salvage could not use: offset, and the chunk if its header is sound.
     broken: list[tuple[int, Chunk | None]] = field(default_factory=list)
     doubts: bool = False  # it was not clear which clip something belongs to

@@ -1,4 +1,4 @@
-"""The grammar of a file: events of a parser and their order, as SPEC.md, "Grammar", prints it."""
+"""The grammar of a file: events of a parser and their order, as in SPEC.md, "Grammar"."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from mcz.container.packets import CHECK_SIZE, Packet, build_packet
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
 
-# States: what was read last, and so what may follow.
+# States: the last thing read, and so the possible next ones.
 UNSIGNED, START, BODY, CLIP, PACKETS, INDEX, FILE = (
     *("signature", "start", "body", "clip"),
     *("packets", "index", "file"),
 )
-# Things that are not called as the type of their chunk.
+# Things with other names than the type of their chunk.
 OPEN_DATA, PACKET, END_PACKET = "open DATA", "packet", "end packet"
 OTHER, FOOT_THING, END = "ancillary", "FOOT", "end of file"
 
@@ -52,7 +52,7 @@ def thing_of(chunk: Chunk) -> str:
 
 
 def order_error(thing: str, label: str, state: str) -> FormatError:
-    """The error of a thing that may not stand where it does."""
+    """The error of a thing at a wrong place."""
     if state == START:
         return FormatError(f"the first chunk is {label}, not HEAD")
     if state == INDEX:
@@ -65,14 +65,14 @@ def order_error(thing: str, label: str, state: str) -> FormatError:
 
 
 def state_after_misplaced(thing: str, state: str) -> str:
-    """The state to go on with behind such a thing."""
+    """The state after a thing at a wrong place."""
     began = {"CLIP": CLIP, "INDX": INDEX, OPEN_DATA: PACKETS}.get(thing)
     return began or (BODY if state in (START, INDEX) else state)
 
 
 @dataclass(slots=True)
 class ChunkEvent:
-    """A chunk; ``data`` begins with its header, and has as much of it as was wanted."""
+    """A chunk; ``data`` is its header and as much of the rest as was requested."""
 
     chunk: Chunk
     data: bytes
@@ -84,24 +84,24 @@ class ChunkEvent:
 
     @property
     def end(self) -> int:
-        """The offset behind it; of an open DATA that of its first packet."""
+        """The offset after it; of an open DATA the offset of its first packet."""
         chunk = self.chunk
         return chunk.payload_offset if chunk.length is None else chunk.offset + chunk.size
 
     @property
     def payload(self) -> bytes:
-        """Its payload, or the beginning of it that was wanted."""
+        """The requested beginning of its payload."""
         length = self.chunk.length or 0
         return self.data[HEADER.size : HEADER.size + length]
 
 
 @dataclass(slots=True)
 class PacketEvent:
-    """A packet of the open DATA ``chunk``, whose body begins at ``body``.
+    """A packet of the open DATA ``chunk``; its body begins at ``body``.
 
-    ``number`` is that of the frame in a packet without a segment of its own, ``segment`` the header
-    of the one in another: None in an end packet, and where they are not known. ``is_masked``: it
-    implies the mask of that before.
+    ``number`` is the number of the frame in a packet without a segment of its own, ``segment`` the
+    header of the segment in another: None in an end packet, and where unknown. ``is_masked``: it
+    implies the mask of the packet before.
     """
 
     chunk: Chunk
@@ -114,7 +114,7 @@ class PacketEvent:
 
     @property
     def header(self) -> SegmentHeader | None:
-        """The header of its segment, also of one that is not spelled out."""
+        """The header of its segment, also if it is implied."""
         if self.number is None:
             return self.segment
         flags = self.packet.fresh * FRESH | self.is_masked * MASKS  # PACK-20
@@ -149,7 +149,7 @@ class FootEvent:
 
     @property
     def is_right(self) -> bool:
-        """Return whether it says where that INDX is, or that there is none."""
+        """Return whether it refers to that INDX, or to none."""
         return (self.foot.index_offset, self.foot.index_length) == self.place
 
     @property
@@ -159,11 +159,11 @@ class FootEvent:
 
 @dataclass(slots=True)
 class Fault:
-    """A break of the rules in what begins at ``offset``.
+    """A break of the rules by a thing at ``offset``.
 
-    ``chunk`` is the one that lies there, or whose packet does, where its header is sound. ``event``
-    is what lies there where its checksums are right, and it alone or its place is wrong: in the
-    ``state`` of the grammar. ``is_lost``: where it ends is not known.
+    ``chunk`` is the chunk there, or the chunk of the packet there, if its header is sound.
+    ``event`` is the thing itself if its checksums are right, and only its content or its place in
+    the ``state`` of the grammar is wrong. ``is_lost``: its end is unknown.
     """
 
     offset: int

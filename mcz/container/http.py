@@ -1,4 +1,4 @@
-"""A file on a web server, read a range at a time; whatever goes wrong there is an AccessError."""
+"""A file on a web server, read a range at a time; every failure is an AccessError."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from mcz.container.http_connections import Answer, Connections
 
 TAIL = 128 * 1024  # bytes at the end that come with the first request: most indexes fit
 RANGE = re.compile(r"bytes (?:([0-9]{1,18})-([0-9]{1,18})|\*)/([0-9]{1,18})")
-STRONG = re.compile(r'"[^"]*"')  # an ETag by which bytes are the same
-NO_SUFFIX = (200, 400, 416, 501)  # what servers answer that do not know of ranges at the end
+STRONG = re.compile(r'"[^"]*"')  # a strong ETag: equal tags, equal bytes
+NO_SUFFIX = (200, 400, 416, 501)  # statuses of servers without suffix ranges
 REPLACED = "the file was replaced while it was read"
 
 
 class HttpFile(io.RawIOBase):
-    """The file at an http or https address, which may seek; a read is at most one request.
+    """The seekable file at an http or https address; a read is at most one request.
 
-    The server must give ranges of bytes (RFC 9110, section 14), of one and the same file: by its
-    ETag, else by when it was last modified, and by its size. Threads may share it, and processes
-    after a fork. Raises AccessError, which names the address and what the server did.
+    The server must serve ranges of bytes (RFC 9110, section 14). Its ETag, else its date, and its
+    size show that the file is unchanged. Threads may share it, and processes after a fork. Raises
+    AccessError with the address and the server's answer.
     """
 
-    is_remote = True  # as ByteSource asks
+    is_remote = True  # read by ByteSource
 
     def __init__(self, address: str) -> None:
         super().__init__()
         self.name = address
         self._at = 0
         self._server = Connections(address)
-        self._conditions: dict[str, str] = {}  # that each request after the first makes
-        self._said: tuple[str | None, ...] | None = None  # what tells this file from a later one
+        self._conditions: dict[str, str] = {}  # headers of each later request
+        self._identity: tuple[str | None, ...] | None = None  # (ETag, date) of the first answer
         self._size, self._tail = self._read_end()
 
     def readable(self) -> bool:
@@ -53,7 +53,7 @@ class HttpFile(io.RawIOBase):
         return data
 
     def read_at(self, at: int, size: int) -> bytes:
-        """The ``size`` bytes at ``at``, fewer where the file ends; wherever the file stands."""
+        """The ``size`` bytes at ``at``, fewer at the end; the position of ``tell`` is not used."""
         size = max(0, min(size, self._size - at))
         start = at - (self._size - len(self._tail))
         if not size:
@@ -70,20 +70,19 @@ class HttpFile(io.RawIOBase):
         super().close()
 
     def _read_end(self) -> tuple[int, bytes]:
-        """The size of the file, and the bytes at its end."""
-        for asked, most in (f"-{TAIL}", TAIL), ("0-0", 1):
-            answer = self._answer(asked, most)
+        for range_text, size in (f"-{TAIL}", TAIL), ("0-0", 1):
+            answer = self._answer(range_text, size)
             if _states_empty(answer):
                 return 0, b""
             if answer.status not in NO_SUFFIX:
                 break
-        if asked == "0-0":
+        if range_text == "0-0":
             whole, tail = self._check_range(answer, 0, 0), b""
         else:
             whole = self._check_range(answer, None, None)
             tail = self._body(answer, min(TAIL, whole))
         tag, date = answer.headers.get("ETag"), answer.headers.get("Last-Modified")
-        self._said = _identity_of(answer.headers)
+        self._identity = _identity_of(answer.headers)
         if tag and STRONG.fullmatch(tag):
             self._conditions = {"If-Match": tag}
         elif date and not tag:
@@ -100,12 +99,12 @@ class HttpFile(io.RawIOBase):
         return self._server.get(headers, most)
 
     def _check_range(self, answer: Answer, first: int | None, last: int | None) -> int:
-        """The size of the whole file, where this is an answer to what was asked.
+        """Check that the answer has the requested range; return the file's size.
 
-        ``first``, ``last``: the bytes that were, None for those at the end.
+        ``first``, ``last``: the requested bytes; None: a range at the end.
         """
-        found = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
-        if answer.status == 412 or (answer.status == 416 and self._said is not None):
+        match = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
+        if answer.status == 412 or (answer.status == 416 and self._identity is not None):
             raise self._server.error(REPLACED)
         if answer.status == 200:
             raise self._server.error(
@@ -114,30 +113,32 @@ class HttpFile(io.RawIOBase):
             )
         if answer.status != 206:
             raise self._server.error(f"the server answers {answer.status} {answer.reason}")
-        if found is None or found[1] is None:
-            raise self._server.error("the server does not say which range it gives")
-        start, stop, whole = (int(number) for number in found.groups())
-        if self._said and (self._said, self._size) != (_identity_of(answer.headers), whole):
+        if match is None or match[1] is None:
+            raise self._server.error("the server does not state the range that it sends")
+        start, stop, whole = (int(number) for number in match.groups())
+        if self._identity and (self._identity, self._size) != (_identity_of(answer.headers), whole):
             raise self._server.error(REPLACED)
         first = max(0, whole - TAIL) if first is None else first
         last = whole - 1 if last is None else last
         if (start, stop) != (first, min(last, whole - 1)):
-            raise self._server.error(f"bytes {first} to {last} are asked for, it gives {found[0]}")
+            raise self._server.error(
+                f"bytes {first} to {last} were requested, the server sent {match[0]}"
+            )
         return whole
 
     def _body(self, answer: Answer, size: int) -> bytes:
         if len(answer.body) != size:
-            came = "more" if len(answer.body) > size else f"{len(answer.body)}"
-            raise self._server.error(f"{size} bytes are announced, {came} came")
+            received = "more" if len(answer.body) > size else f"{len(answer.body)}"
+            raise self._server.error(f"{size} bytes are announced, {received} were received")
         return answer.body
 
 
 def _states_empty(answer: Answer) -> bool:
-    found = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
-    return answer.status == 416 and found is not None and found[3] == "0"
+    match = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
+    return answer.status == 416 and match is not None and match[3] == "0"
 
 
 def _identity_of(headers: Message) -> tuple[str | None, ...]:
-    """The ETag by which a server tells files apart, else when the file was modified."""
+    """(ETag, None), or (None, date of the last change) without an ETag."""
     tag = headers.get("ETag")
     return (tag, None) if tag else (None, headers.get("Last-Modified"))

@@ -1,7 +1,7 @@
-"""Requests to a web server: connections that are kept, redirects, and tries that are repeated.
+"""Requests to a web server: kept connections, redirects, and repeated attempts.
 
-Threads may share them, and processes after a fork. What a server, a proxy or a network does wrong
-is an AccessError that names the address.
+Threads may share them, and processes after a fork. Faults of a server, a proxy or a network are
+AccessErrors that name the address.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from mcz.errors import AccessError, reason_of
 
 TIMEOUT = 30.0  # seconds that a server may be silent
 ATTEMPTS = 3  # of a request that may do better the next time
-DELAY = 0.5  # seconds before the second attempt, twice as many before the third
+DELAY = 0.5  # seconds before the second attempt, doubled before the third
 PATIENCE = 30.0  # seconds that a server may ask to wait
-BUSY = (429, 502, 503, 504)  # answers that may be others in a moment
+BUSY = (429, 502, 503, 504)  # statuses that may change in a moment
 REDIRECTS = (301, 302, 303, 307, 308)
 MOST_REDIRECTS = 5
-EXPIRED = (401, 403, 404, 410)  # what an address answers to which one was led for a while only
-MOST_IGNORED = 64 * 1024  # bytes that are read of what nobody wants, so that a connection is kept
-PLAIN = "%/:=&?~+!$,;'@()*[]"  # that stay as they are in an address
+EXPIRED = (401, 403, 404, 410)  # statuses of an address that a redirect gave for a limited time
+MOST_IGNORED = 64 * 1024  # bytes of an unused body that are read to keep a connection
+PLAIN = "%/:=&?~+!$,;'@()*[]"  # characters of an address that are not escaped
 
 sleep = time.sleep
 
@@ -57,14 +57,14 @@ class _Goal(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """A connection; ``headers`` are for the proxy that it goes to, None where it goes straight."""
+    """A connection; ``headers`` are for its proxy, None without a proxy."""
 
     connection: http.client.HTTPConnection
     headers: dict[str, str] | None = None
 
 
 class Connections:
-    """Gets ranges of the file at ``address``; raises AccessError for one that is none."""
+    """Gets ranges of the file at ``address``; raises AccessError for a bad address."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -76,8 +76,8 @@ class Connections:
     def get(self, headers: dict[str, str], most: int) -> Answer:
         """The answer to GET with these headers, its body up to ``most`` bytes and one more.
 
-        Tries again, ``ATTEMPTS`` times in all, where the connection breaks, nothing comes or the
-        server is busy; raises AccessError, which says how often it was tried.
+        Tries again, ``ATTEMPTS`` times in all, if the connection breaks, no answer comes or the
+        server is busy; raises AccessError with the number of attempts.
         """
         attempt, wait = 1, 0.0
         while True:
@@ -104,7 +104,7 @@ class Connections:
         return AccessError(text, path=self.address)
 
     def close(self) -> None:
-        """Close what is kept open."""
+        """Close kept connections."""
         idle, self._idle = self._idle, {}
         for lines in idle.values():
             for line in lines:
@@ -117,7 +117,7 @@ class Connections:
         except ValueError as error:
             raise self.error(str(error)) from None
         if parts.scheme not in ("http", "https") or not parts.hostname:
-            raise self.error(f"{address} is no address of http or https")
+            raise self.error(f"{address} is not an address of http or https")
         if "@" in parts.netloc:
             raise self.error("an address with a user and a password is not taken")
         query = f"?{parts.query}" if parts.query else ""
@@ -125,7 +125,7 @@ class Connections:
         return _Goal(parts.scheme, parts.hostname, port, path)
 
     def _follow(self, headers: dict[str, str], most: int) -> Answer:
-        """The answer behind all redirects, where the next request goes at once."""
+        """The answer after all redirects, whose target the next request uses directly."""
         goal = self._goal
         for _ in range(MOST_REDIRECTS + 1):
             answer = self._send(goal, headers, most)
@@ -147,7 +147,7 @@ class Connections:
         return led
 
     def _send(self, goal: _Goal, headers: dict[str, str], most: int) -> Answer:
-        """The answer of the server at ``goal``; a connection that it has closed is made anew."""
+        """The answer of the server at ``goal``; a closed connection is opened again."""
         while True:
             line, is_new = self._find_line(goal)
             try:
@@ -170,7 +170,7 @@ class Connections:
             return answer
 
     def _find_line(self, goal: _Goal) -> tuple[_Line, bool]:
-        if self._process != os.getpid():  # those of the parent are its own
+        if self._process != os.getpid():  # connections of the parent belong to it
             self._idle, self._lock, self._process = {}, Lock(), os.getpid()
         with self._lock:
             idle = self._idle.get(goal._replace(path=""))
@@ -198,7 +198,7 @@ class Connections:
 
 
 def _exchange(line: _Line, goal: _Goal, headers: dict[str, str], most: int) -> tuple[Answer, bool]:
-    """The answer on this connection, and whether the next one may come on it."""
+    """The answer on this connection, and whether it may be kept for the next request."""
     if line.headers is None:
         line.connection.request("GET", goal.path, headers=headers)
     else:
@@ -228,12 +228,12 @@ def _is_worth_a_retry(error: Exception) -> bool:
 
 
 def _retry_after(headers: Message) -> float:
-    """The seconds that a server asks to wait, 0 where it does not say."""
-    said = headers.get("Retry-After", "").strip()
-    if said.isdecimal():
-        return float(said[:9])
+    """The requested seconds to wait, 0 if the server states none."""
+    text = headers.get("Retry-After", "").strip()
+    if text.isdecimal():
+        return float(text[:9])
     try:
-        return max(0.0, parsedate_to_datetime(said).timestamp() - time.time())
+        return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
     except (ValueError, TypeError, OverflowError):
         return 0.0
 

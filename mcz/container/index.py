@@ -1,6 +1,6 @@
-"""INDX: the Directory of a file as bytes, or what is new in it since another INDX.
+"""INDX: the Directory of a file as bytes, or its additions since another INDX.
 
-SPEC.md, "INDX", is normative; ``index_reader.py`` has the way back.
+SPEC.md, "INDX", is normative; ``index_reader.py`` has the inverse.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from mcz.model.schema import Table, build, deflate
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
 PACKETS = {SEGMENT: 64, FRAME: 32}
-INDEXES = 4  # of these a writer leaves no more, so that few requests open a file
-GROWTH = 27  # times the bytes of what is new: a smaller INDX is made part of it
+INDEXES = 4  # a writer leaves at most so many, so that few requests open a file
+GROWTH = 27  # times the bytes of the additions: a smaller INDX is merged into the new one
 SIGNAL_ROW = attrgetter(*(f.name for f in fields(SignalRow)))
 
 
 def build_index(directory: Directory) -> bytes:
-    """The whole INDX chunk, which continues what the file has of them where that is larger."""
+    """The whole INDX chunk, which continues the present ones of the file if they are larger."""
     kept = list(directory.indexes)
     while True:
         content = index_content(directory, kept[-1] if kept else None)
@@ -55,7 +55,7 @@ def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
 
 
 def index_content(directory: Directory, since: IndexPlace | None = None) -> bytes:
-    """The index of what is new ``since`` another one, not deflated yet."""
+    """The index of the additions ``since`` another one, not deflated yet."""
     return build(index_record(directory, since), "INDX")
 
 
@@ -80,7 +80,7 @@ def index_record(directory: Directory, since: IndexPlace | None = None) -> Index
 
 @dataclass(slots=True)
 class Listing:
-    """The content of an index: all of ``new``, which lies behind ``start``.
+    """The content of an index: all of ``new``, from ``start`` on.
 
     ``behind``: new ancillary chunks of the clip before.
     """
@@ -95,9 +95,9 @@ class Listing:
         clips = list(new.clips.values())
         segments = [segment_rows(clip) for clip in clips]
         skeletons = {id_: n for n, id_ in enumerate(dict.fromkeys(c.skeleton for c in clips))}
-        shared = zip(new.shared, _places(new.shared.values(), start), strict=True)
+        shared = zip(new.shared, _chunk_places(new.shared.values(), start), strict=True)
         parts = [part for row in new.attachments.values() for part in row.parts]
-        ancillary = [*_places(self.behind, start)]
+        ancillary = [*_chunk_places(self.behind, start)]
         rows: list[tuple[str | int, ...]] = []
         end = start
         for clip, packed in zip(clips, segments, strict=True):
@@ -114,7 +114,7 @@ class Listing:
                 )
             )
             end = cend.stop
-            ancillary += _places(clip.ancillary, end)
+            ancillary += _chunk_places(clip.ancillary, end)
         return Index(
             head=new.head,
             shared=Table.of(IndexedChunk, [(kind, id_, *at) for (_, id_), (kind, *at) in shared]),
@@ -122,7 +122,7 @@ class Listing:
                 IndexedAttachment,
                 [(row.name, row.size, len(row.parts)) for row in new.attachments.values()],
             ),
-            parts=Table.of(IndexedPlace, list(_places(parts, start))),
+            parts=Table.of(IndexedPlace, list(_chunk_places(parts, start))),
             aliases=Table.of(IndexedAlias, [(name, *row) for name, row in new.aliases.items()]),
             skeletons=list(skeletons),
             clips=Table.of(IndexedClip, rows),
@@ -133,8 +133,8 @@ class Listing:
         )
 
 
-def _places(chunks: Iterable[Chunk], end: int) -> Iterator[tuple[bytes, int, int]]:
-    """Type, gap and length of chunks in file order, behind ``end``."""
+def _chunk_places(chunks: Iterable[Chunk], end: int) -> Iterator[tuple[bytes, int, int]]:
+    """Type, gap and length of chunks in file order, after ``end``."""
     for chunk in chunks:
         yield chunk.type, chunk.offset - end, chunk.size - FRAMING
         end = chunk.stop

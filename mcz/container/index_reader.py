@@ -1,8 +1,6 @@
-"""INDX as a Directory: tables are read in bulk, rows of clips made when they are asked for.
+"""INDX as a Directory: tables are read in bulk, rows of clips created on first use.
 
-``IndexCheck`` compares it with the chunks before it.
-
-SPEC.md, "INDX", is normative.
+``IndexCheck`` compares it with the chunks before it. SPEC.md, "INDX", is normative.
 """
 
 from __future__ import annotations
@@ -36,16 +34,16 @@ from mcz.errors import FormatError
 from mcz.model.schema import MAX_COUNT, Table, build, inflate, parse
 from mcz.model.schema.columns import Numbers
 
-MOST_INDEXES = 8  # that continue each other
+MOST_INDEXES = 8  # length of a chain of indexes
 
 T = TypeVar("T")
 Places = Table[IndexedChunk] | Table[IndexedPlace]
-Fetch = Callable[[int, int], bytes]  # the bytes at an offset, so many
+Fetch = Callable[[int, int], bytes]  # bytes by offset and size
 
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """An INDX that was read: what names it, what it continues, and its content."""
+    """An INDX: its name, the one that it continues, and its content."""
 
     chunk: PreviousIndex
     previous: PreviousIndex | None
@@ -54,7 +52,7 @@ class Listed:
 
     @property
     def start(self) -> int:
-        """The offset from which on it lists what there is."""
+        """The offset of the first thing that it lists."""
         return 0 if self.previous is None else self.previous.stop
 
 
@@ -87,7 +85,7 @@ def index_name(data: bytes, offset: int) -> PreviousIndex:
 
 
 def read_indexes(fetch: Fetch, offset: int, length: int, limit: int) -> Iterator[Listed]:
-    """The INDX chunk there, then the one that it continues, and so on; raises FormatError."""
+    """The INDX chunk at an offset, then the one that it continues, and so on; FormatError."""
     due: PreviousIndex | None = None
     for _ in range(MOST_INDEXES):
         listed = parse_index(fetch(offset, length), offset, limit)
@@ -100,9 +98,9 @@ def read_indexes(fetch: Fetch, offset: int, length: int, limit: int) -> Iterator
     raise FormatError(f"more than {MOST_INDEXES} INDX continue each other")  # INDX-07
 
 
-def directory_of(found: Iterable[Listed]) -> Directory:
-    """The Directory that these say together, the last one first."""
-    each = list(found)[::-1]
+def directory_of(indexes: Iterable[Listed]) -> Directory:
+    """The Directory of these indexes together, the last one first."""
+    each = list(indexes)[::-1]
     directory = Directory(head=each[-1].index.head)
     clips = _Clips()
     for listed in each:
@@ -121,7 +119,7 @@ def directory_of(found: Iterable[Listed]) -> Directory:
 
 
 def place_of(chunk: PreviousIndex, n_bytes: int, directory: Directory) -> IndexPlace:
-    """The place of an INDX, behind which ``directory`` is all there is so far."""
+    """The place of an INDX, after which ``directory`` has everything up to now."""
     return IndexPlace(
         chunk,
         n_bytes,
@@ -163,14 +161,14 @@ def _bounds(counts: Numbers, total: int, what: str) -> Numbers:
 
 
 def _ends(sizes: Numbers, start: int) -> Numbers:
-    """The ends of things of these sizes that lie one after the other from ``start`` on."""
+    """The ends of consecutive things of these sizes from ``start`` on."""
     if start + sizes.sum(dtype=np.float64) > MAX_COUNT:  # CONV-01
         raise FormatError("INDX: an offset beyond 2^53 - 1")
     return start + np.cumsum(sizes)
 
 
 def _chunks_of(table: Places, start: int, kind: bytes = ChunkType.ATTA) -> list[Chunk]:
-    """The chunks of a table with ``gap`` and ``length``, the first behind ``start``."""
+    """The chunks of a table with ``gap`` and ``length``, the first after ``start``."""
     lengths = table.numbers("length")
     ends = _ends(table.numbers("gap") + lengths + FRAMING, start)
     offsets = (ends - lengths - FRAMING).tolist()
@@ -223,7 +221,7 @@ class ClipTables:
     @cached_property
     def _signals(self) -> list[SignalRow]:
         rows = cast(Packed, self.index.signals.rows())
-        known = {row: SignalRow(*row) for row in set(rows)}  # those of an archive are few
+        known = {row: SignalRow(*row) for row in set(rows)}  # an archive has few different ones
         return [known[row] for row in rows]
 
     def row(self, number: int) -> ClipRow:
@@ -245,7 +243,7 @@ class ClipTables:
         return row
 
     def ancillary(self, group: int, start: int) -> list[Chunk]:
-        """The ancillary chunks behind clip ``group`` - 1, or of group 0 behind the clips before."""
+        """The ancillary chunks after clip ``group`` - 1, of group 0 after the clips before."""
         first, stop = self.ancillary_bounds[group : group + 2]
         table = self.index.ancillary[first:stop]
         return [
@@ -260,13 +258,11 @@ class ClipTables:
 
     def having(self, kind: bytes) -> Iterator[int]:
         """The groups that have an ancillary chunk of a type."""
-        found = [n for n, one in enumerate(self.index.ancillary.blobs("type")) if one == kind]
-        yield from (np.searchsorted(self.ancillary_bounds, found, side="right") - 1).tolist()
+        groups = [n for n, one in enumerate(self.index.ancillary.blobs("type")) if one == kind]
+        yield from (np.searchsorted(self.ancillary_bounds, groups, side="right") - 1).tolist()
 
 
 class _Clips:
-    """The clips of several INDX, in file order."""
-
     def __init__(self) -> None:
         self.names: list[str] = []
         self._tables: list[tuple[int, ClipTables]] = []  # with the number of the first clip
@@ -299,7 +295,7 @@ class _Clips:
 
 def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
     segments: list[SegmentRow] = []
-    told: SegmentRow | None = None  # whose mask packets of kind 2 have
+    model_row: SegmentRow | None = None  # has the mask of packets of kind 2
     first, where = [0] * len(clip.signals), f"INDX: clip {clip.name!r}"
     end = clip.clip.stop  # INDX-01
     for gap, size, signal, n_frames, lead, tail, flags in rows:
@@ -312,11 +308,11 @@ def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
         if kind == FRAME:
             if header != SegmentHeader(0, first[0], 1, flags=flags & FRESH):
                 raise FormatError(f"{where} has {header} as a packet of kind {kind}")
-            if told is not None:
+            if model_row is not None:
                 header = replace(header, flags=header.flags | MASKS)
-                row = replace(row, header=header, told=told)
+                row = replace(row, header=header, mask_row=model_row)
         elif signal == 0:
-            told = row if kind and flags & MASKS else None
+            model_row = row if kind and flags & MASKS else None
         segments.append(row)
         first[signal] += n_frames
         end += gap + size
@@ -324,13 +320,13 @@ def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
 
 
 class IndexCheck:
-    """Compares each INDX of a file with what lies before it."""
+    """Compares each INDX of a file with the chunks before it."""
 
     def __init__(self) -> None:
-        self._found: list[tuple[IndexPlace, int]] = []  # and how many continue each other there
+        self._found: list[tuple[IndexPlace, int]] = []  # each with the length of its chain
 
     def check(self, payload: bytes, chunk: Chunk, directory: Directory, limit: int) -> None:
-        """Compare the next INDX with what was found; raises FormatError.
+        """Compare the next INDX with the chunks; raises FormatError.
 
         ``limit`` bounds its inflated size.
         """
@@ -355,16 +351,16 @@ class IndexCheck:
 
 def _first_difference(listed: Index, due: Index) -> str:
     for name, given in vars(listed).items():
-        wanted = getattr(due, name)
-        if name == "extension" or given == wanted:
+        expected = getattr(due, name)
+        if name == "extension" or given == expected:
             continue
         if name == "head":
             return "its copy of HEAD differs from HEAD"
         if not isinstance(given, Table):
-            return f"{name} is {given!r}, the file has {wanted!r}"
-        if len(given) != len(wanted):
-            return f"it lists {len(given)} {name}, there are {len(wanted)}"
-        for row, (one, other) in enumerate(zip(given, wanted, strict=True)):
+            return f"{name} is {given!r}, the file has {expected!r}"
+        if len(given) != len(expected):
+            return f"it lists {len(given)} {name}, there are {len(expected)}"
+        for row, (one, other) in enumerate(zip(given, expected, strict=True)):
             for field, value in vars(one).items():
                 if value != getattr(other, field):
                     return (

@@ -39,7 +39,7 @@ class PreviousIndex(Record):
 
 
 class Indx(Record):
-    """INDX, a cache of what a file holds and where."""
+    """INDX, a cache of the contents of a file and their places."""
 
     flags: int = field(flags("continues"), "bit 0: continues an INDX before it", default=0)
     previous: PreviousIndex | None = field(

@@ -1,4 +1,4 @@
-"""Versions and profiles: the format that a file needs and the limits that it promises to keep.
+"""Versions and profiles: the format that a file needs, and the limits that it keeps.
 
 SPEC.md, "Versions" and "Limits and profiles", are normative.
 """
@@ -11,7 +11,7 @@ from construct import Container, Int8ul
 
 from mcz.errors import LimitError, OptionError, UnsupportedError
 from mcz.hints import Hint
-from mcz.model.schema import CheckedBeside
+from mcz.model.schema import CheckedInRecord
 
 MIB = 2**20
 LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that a search may read in vain, in all
@@ -19,7 +19,7 @@ LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that a search may read in vain, 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """Upper bounds; bytes are decoded bytes unless the name says otherwise."""
+    """Upper bounds; bytes are decoded bytes unless the name states otherwise."""
 
     id: int
     name: str
@@ -33,7 +33,8 @@ class Profile:
     signals: int
     rows: int
     is_plain: bool = False  # nothing is packed, codecs and grids are few: see ``strict.py``
-    coded_bytes: int = 2**53  # decoded, of a segment that writers make, so that its DATA is short
+    # decoded size of a segment that writers make, so that its DATA is short
+    coded_bytes: int = 2**53
 
     @property
     def counts(self) -> dict[str, int]:
@@ -88,7 +89,7 @@ def check(what: str, value: int, limit: int) -> None:
 
 
 def check_decoded(what: str, value: int, limit: int) -> None:
-    """Raise LimitError where ``value`` bytes exceed what the caller lets one file decode to."""
+    """Raise LimitError where ``value`` bytes exceed the limit that the caller sets for a file."""
     if value > limit:  # LIMIT-02
         raise LimitError(
             f"{what}: {value} bytes are over the limit of {limit} decoded bytes",
@@ -98,7 +99,7 @@ def check_decoded(what: str, value: int, limit: int) -> None:
 
 
 def index_limit(file_bytes: int) -> int:
-    """The bytes that an index may inflate to: a row is hardly longer than what it lists."""
+    """Greatest inflated size of an index: a row is hardly longer than the thing that it lists."""
     return max(64 * 1024, 2 * file_bytes)  # LIMIT-13
 
 
@@ -113,19 +114,19 @@ def output_limit(file_bytes: int) -> int:
 
 
 class Search:
-    """Budget of bytes that a search for the next whole chunk may read in vain."""
+    """Budget of bytes that a search for the next intact chunk may read in vain."""
 
     def __init__(self) -> None:
         self.tried = 0
 
-    def spend(self, n_bytes: int, came: int, what: str) -> None:
-        """Count bytes that were read among ``came``; raises LimitError for too many."""
+    def spend(self, n_bytes: int, n_received: int, what: str) -> None:
+        """Count ``came`` bytes as read; raises LimitError for too many."""
         self.tried += n_bytes
-        if self.tried > max(LEAST_TRIED, TRIED_PER_BYTE * came):
+        if self.tried > max(LEAST_TRIED, TRIED_PER_BYTE * n_received):
             raise LimitError(f"too much looks like {what} and is none; {self.tried} bytes read")
 
 
-FORMAT = 0, 99  # the draft of 1.0, which reads itself alone
+FORMAT = 0, 99  # the draft of 1.0, which reads only itself
 FORMAT_NAME = f"{FORMAT[0]}.{FORMAT[1]}"
 
 
@@ -139,4 +140,4 @@ def _check_version(needs_minor: int, record: Container) -> bool:
     return True
 
 
-NEEDS_MINOR = CheckedBeside(Int8ul, _check_version)
+NEEDS_MINOR = CheckedInRecord(Int8ul, _check_version)

@@ -1,6 +1,6 @@
-"""Write locks: one process writes to a file at a time, and others can see that it does.
+"""Write locks: one process writes to a file at a time, and others can see it.
 
-A lock is advice, which not every file system takes; where none can be had, all goes on without.
+A lock is advisory, and some file systems have none; then writing continues without.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import sys
 import time
 from typing import BinaryIO
 
-BUSY = (errno.EACCES, errno.EAGAIN)  # what a lock says that another process holds
-FAR = 2**62  # Windows locks bytes; no file has one here
-PATIENCE, PAUSE = 0.2, 0.01  # seconds: a reader that looks holds the lock for an instant
+BUSY = (errno.EACCES, errno.EAGAIN)  # errors of a lock held by another process
+LOCK_OFFSET = 2**62  # Windows locks bytes; no file has one here
+PATIENCE, PAUSE = 0.2, 0.01  # seconds: a reader holds the lock only for an instant
 
 
 def lock(stream: BinaryIO) -> bool:
-    """Take the file of ``stream`` until that closes; False where another process has it."""
+    """Lock the file of ``stream`` until it closes; False if another process has it."""
     until = time.monotonic() + PATIENCE
     while _take(stream) is False:
         if time.monotonic() > until:
@@ -34,7 +34,7 @@ def is_locked(stream: BinaryIO) -> bool:
 
 
 def is_abandoned(stream: BinaryIO) -> bool:
-    """Return True, with the lock taken, for a file that its writer has abandoned."""
+    """Return True, with the file locked, for a file that its writer has abandoned."""
     return _take(stream) is True
 
 
@@ -51,7 +51,7 @@ if sys.platform == "win32":
     def _lock_far(stream: BinaryIO, mode: int) -> bool | None:
         at = stream.tell()
         try:
-            stream.seek(FAR)
+            stream.seek(LOCK_OFFSET)
             msvcrt.locking(stream.fileno(), mode, 1)
         except OSError as error:
             return False if error.errno in BUSY else None

@@ -21,14 +21,14 @@ from mcz.model.schema import build, parse, parse_all, parse_until
 from mcz.model.text_format import nearest
 
 MOST_KEPT = 16 * MIB  # bytes, about: 40,000 clips of three keys
-PAIR = 100  # bytes that Python takes for a pair, beside its letters
+PAIR = 100  # bytes of a pair in Python, without its letters
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
     """A META record of the clip ``name``, or with "" of the whole file.
 
-    ``removed`` are keys that are not there any more, ``entries`` what is there from now on.
+    ``removed`` are keys to delete, ``entries`` keys and values to set.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Record:
     removed: tuple[str, ...] = ()
 
 
-Placed = dict[str, list[tuple[int, Record]]]  # by name, each with where its META begins
+Placed = dict[str, list[tuple[int, Record]]]  # by name, each with the offset of its META
 
 
 class MetadataCache:
@@ -59,7 +59,7 @@ class MetadataCache:
 
 
 def apply_records(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, str]:
-    """``pairs`` as they are after the records, in order."""
+    """Apply the records to ``pairs``, in order."""
     updated = dict(pairs)
     for record in records:
         for key in record.removed:
@@ -69,7 +69,7 @@ def apply_records(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[s
 
 
 def merge_records(name: str, records: Iterable[Record]) -> Record:
-    """A record of ``name`` that says what ``records`` say together."""
+    """A record of ``name`` equivalent to ``records`` in order."""
     entries: dict[str, str] = {}
     removed: dict[str, None] = {}
     for record in records:
@@ -83,7 +83,7 @@ def merge_records(name: str, records: Iterable[Record]) -> Record:
 def build_metas(
     records: Sequence[Record], *, short: bool = False, profile: Profile = BASE
 ) -> Iterator[bytes]:
-    """The payloads of the META chunks that hold ``records``, each of about 1 MiB at most."""
+    """The payloads of META chunks with ``records``, each of about 1 MiB at most."""
     content = bytearray()
     for record in records:
         content += record_bytes(record)
@@ -106,7 +106,7 @@ def record_bytes(record: Record) -> bytes:
 
 
 def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
-    """The records in ``payload``, that of the META ``chunk`` of a file of ``file_bytes``.
+    """The records in ``payload``, of the META ``chunk`` of a file of ``file_bytes``.
 
     Raises FormatError, and LimitError where they would be longer than an index may be.
     """
@@ -128,7 +128,7 @@ def read_records(
 ) -> Placed:
     """Collect the META records of each name, and their offsets, in file order.
 
-    ``lenient``: of one that is damaged nothing is taken, and nothing raised.
+    ``lenient``: a damaged META is skipped, and no error raised.
     """
     placed: Placed = {}
     for chunk in chunks:
@@ -146,7 +146,7 @@ def read_records(
 def _check_keys(keys: Sequence[str], where: str) -> None:
     for key in keys:
         if key in INTERPRETED:  # META-03
-            raise FormatError(f"{key!r} is not to be said behind a clip", where=where)
+            raise FormatError(f"{key!r} must not follow a clip", where=where)
     if len(keys) != len(set(keys)):  # META-04
         raise FormatError(f"a key occurs twice in one record: {sorted(keys)}", where=where)
 
@@ -154,7 +154,7 @@ def _check_keys(keys: Sequence[str], where: str) -> None:
 PRIVATE = "x-"
 SPDX = re.compile(r"\(*[A-Za-z0-9.+:-]+\)*( (AND|OR|WITH) \(*[A-Za-z0-9.+:-]+\)*)*")
 DOI = re.compile(r"10\.[0-9]{4,9}/\S+")
-FRACTION = re.compile(r"(\.[0-9]{1,6})[0-9]{0,3}")  # of a second; datetime knows six digits
+FRACTION = re.compile(r"(\.[0-9]{1,6})[0-9]{0,3}")  # of a second; datetime reads six digits
 
 
 def _is_date(value: str) -> bool:
@@ -165,7 +165,7 @@ def _is_date(value: str) -> bool:
 
 
 def _is_time(value: str) -> bool:
-    """A date and a time of day, perhaps with its difference from UTC, as ISO 8601 has them."""
+    """Return whether a text is a date and time by ISO 8601, perhaps with its offset from UTC."""
     if not re.match(r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}", value):
         return False
     return _parses(datetime.fromisoformat, FRACTION.sub(r"\1", value))
@@ -193,7 +193,7 @@ EXAMPLES = {
     "DOI": "10.1000/182",
 }
 
-# The first three are about values and source of a clip, and not to be said behind it (META-03).
+# The first three describe values and source of a clip, and must not follow it (META-03).
 KEYS = {
     "name-encoding": "text",
     "skeleton-note": "text",
@@ -220,15 +220,15 @@ KEYS = {
     "doi": "DOI",
     "mtime": "time",
 }
-SPELLINGS = {"license": "licence"}  # of keys as users may type them
+SPELLINGS = {"license": "licence"}  # of keys that users may type
 INTERPRETED = tuple(KEYS)[:3]
-SETTABLE = tuple(KEYS)[3:]  # what users set
+SETTABLE = tuple(KEYS)[3:]  # keys that users set
 
 
 def check_pair(key: str, value: str | None) -> None:
-    """Raise OptionError for a key that is not to be set, or a value that it may not have.
+    """Raise OptionError for a key that cannot be set, or a value that it cannot have.
 
-    ``value`` None: it is to be removed.
+    ``value`` None: it is removed.
     """
     if key in INTERPRETED:
         raise OptionError(f"{key!r} belongs to the values or the source of a clip, and stays")

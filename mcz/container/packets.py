@@ -22,7 +22,7 @@ MOST_HEAD = 1 + MOST_SEQUENCE + MOST_LENGTH
 
 @dataclass(slots=True)
 class Packet:
-    """A packet; ``implied`` is what its check covers beside its bytes, see ``implied_by``."""
+    """A packet; ``implied`` are bytes that its check covers too, see ``implied_by``."""
 
     kind: int
     sequence: int
@@ -57,8 +57,8 @@ def head_size(sequence: int, length: int) -> int:
 def parse_packet_head(data: bytes | bytearray, at: int, limit: int) -> tuple[int, int, int, int]:
     """The first byte of the packet at ``at``, its sequence, the start and the end of its body.
 
-    Nothing is checked by a checksum yet. Raises TruncatedError where ``data`` ends in the head,
-    FormatError for what is no head, LimitError for a body over ``limit``.
+    Its checksum is not checked. Raises TruncatedError where ``data`` ends in the head, FormatError
+    for a bad head, LimitError for a body over ``limit``.
     """
     first = data[at]
     if first & 0x70:  # PACK-08
@@ -78,7 +78,7 @@ def parse_packet_head(data: bytes | bytearray, at: int, limit: int) -> tuple[int
 
 
 def is_packet(data: bytes, packet: Packet) -> bool:
-    """True where ``data`` ends with such a packet, whatever its sequence number."""
+    """True where ``data`` ends with such a packet, of any sequence number."""
     length = len(packet.body)
     body_at = len(data) - CHECK_SIZE - length
     first, ending = _head(packet.kind, packet.fresh, 0, length)[:1], varint(length)

@@ -1,7 +1,7 @@
-"""The parser of files: bytes in, events out, whoever reads the bytes.
+"""The parser of files: bytes in, events out, from any reader of bytes.
 
-It follows the table of ``grammar.py``, and says of every break where it is; what to do about it is
-up to those who take the events. SPEC.md, "Chunks", "Grammar", "Open DATA and packets" and
+It follows the table of ``grammar.py``, and reports the place of every break; the receiver of the
+events decides what to do about it. SPEC.md, "Chunks", "Grammar", "Open DATA and packets" and
 "Salvage", are normative.
 """
 
@@ -20,8 +20,8 @@ from mcz.container.chunks import (
     Chunk,
     check_crc,
     check_signature_in,
+    parse_chunk_header,
     parse_foot,
-    parse_header,
 )
 from mcz.container.grammar import (
     BODY,
@@ -60,21 +60,20 @@ from mcz.container.packets import (
 )
 from mcz.container.packets import END as END_KIND
 from mcz.container.packets import FRESH as FRESH_PACKET
-from mcz.container.segments import FRESH, MASKS, mask_of
-from mcz.container.segments import parse_header as parse_segment
+from mcz.container.segments import FRESH, MASKS, mask_of, parse_segment_header
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
 from mcz.model.schema import MAX_COUNT
 
-BLOCK = 2 * 1024 * 1024  # a chunk that is longer, and not wanted, is checked in parts
-ALL = MAX_COUNT  # of a payload, which is checked then
-PASS = -1  # less than nothing of it: it is not checked at all
-TRY = 256  # bytes that a try in a search counts as, beside those of the chunk
+BLOCK = 2 * 1024 * 1024  # a longer chunk whose payload is not requested is checked in parts
+WHOLE = MAX_COUNT  # the payload is requested whole, and then checked
+UNCHECKED = -1  # neither read nor checked
+TRIAL_BYTES = 256  # cost of a trial in a search, added to the bytes of the chunk
 
 Want = Callable[[Chunk], int]
 
 
 class Short(Exception):
-    """More bytes are needed: those up to ``stop``."""
+    """More bytes are needed: up to ``stop``."""
 
     def __init__(self, stop: int) -> None:
         super().__init__()
@@ -84,15 +83,15 @@ class Short(Exception):
 class Parser:
     """The state of a parser, which is fed with bytes and asked for events.
 
-    ``size`` is that of the file, None where it is not known until ``end``. ``want`` tells how many
-    bytes of the payload of a chunk its event is to have, ``ALL`` or ``PASS``; with ``check`` the
-    others are read nevertheless, for the checksum.
+    ``size`` is the size of the file, None if unknown until ``end``. ``want`` returns the number of
+    bytes of a payload that its event needs, ``WHOLE_PAYLOAD`` or ``UNCHECKED``; with ``check`` the
+    others are read too, for the checksum.
 
     The thing at ``at`` is next, in the state ``state`` of the grammar. After a Fault the parser
-    goes on behind what is wrong where its end is known, else with the next thing that is whole.
+    continues after the faulty thing if its end is known, else with the next intact thing.
     """
 
-    candidate = re.compile(  # looks like the beginning of a chunk, or is that of a FOOT
+    candidate = re.compile(  # looks like the beginning of a chunk or of a FOOT
         rb"(?=[A-Za-z]{4}[\x00-\x03]\x00|\x00{4}.{20}" + re.escape(END_MAGIC) + b")", re.DOTALL
     )
 
@@ -103,26 +102,26 @@ class Parser:
         at: int = 0,
         state: str = UNSIGNED,
         chunk: Chunk | None = None,
-        want: Want = lambda chunk: ALL,
+        want: Want = lambda chunk: WHOLE,
         check: bool = True,
     ) -> None:
         self.size, self.at, self.state = size, at, state
         self.profile = BASE
         self.is_done = False
-        self._number, self._is_told = 0, False  # of the frame that is due, once a packet told it
+        self._number, self._is_told = 0, False  # of the next frame, if a packet states it
         self._want, self._check, self._name = want, check, "the file"
-        self._start, self._data = at, b""  # what was fed and may be needed
+        self._start, self._data = at, b""  # fed bytes that may still be needed
         self._stop = at + 1  # bytes up to here are needed
         self._sequence = 0  # of the packet that is due
-        self._told = b""  # the segment of signal 0 that packets of kind 2 go on with
+        self._mask_segment = b""  # the segment of signal 0 that packets of kind 2 continue
         self._is_masked = False
-        self._implied: bytes | None = b""  # its mask, None where it has to be taken out
+        self._implied: bytes | None = b""  # its mask, None if it must be extracted
         self._index: Chunk | None = None  # an INDX that waits for its FOOT
-        self._chunk = chunk  # what lies at ``at``, or the open DATA around it
-        self._parts: tuple[ChunkEvent, int] | None = None  # a chunk in parts, its crc so far
+        self._chunk = chunk  # the chunk at ``at``, or the open DATA around it
+        self._parts: tuple[ChunkEvent, int] | None = None  # a chunk in parts, its crc up to now
         self._is_lost = False
         self._vain = Search()
-        self._tried = 0  # bytes of the chunk that was looked at last
+        self._tried = 0  # size of the last tried chunk
 
     @property
     def wants(self) -> tuple[int, int]:
@@ -131,16 +130,16 @@ class Parser:
         return end, self._stop - end
 
     def feed(self, data: bytes) -> None:
-        """Take the bytes that ``wants`` asks for, or more of them."""
+        """Append the bytes requested by ``wants``, or more of them."""
         used = min(max(0, self.at - self._start), len(self._data))
         self._start, self._data = self._start + used, self._data[used:] + data
 
     def end(self) -> None:
-        """Learn that a stream ends behind the bytes that were fed."""
+        """Note that the stream ends after the bytes that were fed."""
         self.size, self._name = self._start + len(self._data), "the stream"
 
     def next(self) -> Event | None:
-        """The next event; None where more bytes are needed for it, or nothing follows."""
+        """The next event; None if it needs more bytes, or none follows."""
         if self.state == UNSIGNED:
             return self._read_signature()
         begin = self.at if self._parts is None else self._parts[0].offset
@@ -159,20 +158,20 @@ class Parser:
             return self._fault(begin, error)
 
     def search(self, at: int) -> None:
-        """Let the next thing be the first that is whole at ``at`` or behind it."""
+        """Continue with the first intact thing at ``at`` or after it."""
         self._go_to(at)
         self._is_lost, self._index = True, None
         self.state = {PACKETS: CLIP, INDEX: BODY}.get(self.state, self.state)
 
     def _fault(self, begin: int, error: FormatError) -> Fault:
-        """The Fault of what begins at ``begin``, where ``at`` still is unless its end is known."""
+        """The Fault of the thing at ``begin``; ``at`` stays there unless its end is known."""
         is_lost = self.at == begin
         if is_lost:
             self.search(begin if self.state == PACKETS else begin + 1)
         return Fault(begin, error, self._chunk, is_lost=is_lost)
 
     def _search_next(self) -> Event | None:
-        """The next thing that is whole, at ``at`` or behind it."""
+        """The next intact thing, at ``at`` or after it."""
         while True:
             begin = self.at
             for match in self.candidate.finditer(self._data, begin - self._start):
@@ -182,7 +181,7 @@ class Parser:
                 try:
                     event = self._read_next()
                 except FormatError as error:
-                    if self.at != at:  # it is whole, but not right
+                    if self.at != at:  # intact, but wrong
                         self._is_lost = False
                         return self._fault(at, error)
                     self.state = state
@@ -196,14 +195,14 @@ class Parser:
             if self.size is not None and end >= self.size:
                 self._is_lost, self.at = False, self.size
                 return self._read_next()
-            self.at = max(begin, end - FOOT.size + 1)  # one may begin there that is not all there
+            self.at = max(begin, end - FOOT.size + 1)  # one may begin there that is incomplete
             raise Short(end + 1)
 
     def _spend(self, begin: int) -> Fault | None:
-        """Count what was looked at in vain; return the last event where that is too much."""
+        """Count bytes searched in vain; return the last event if they are too many."""
         try:
             came = self._start + len(self._data) if self.size is None else self.size
-            self._vain.spend(self._tried + TRY, came, "a chunk")  # LIVE-04
+            self._vain.spend(self._tried + TRIAL_BYTES, came, "a chunk")  # LIVE-04
         except LimitError as error:
             self.is_done = True
             return Fault(begin, error, is_lost=True)
@@ -216,7 +215,6 @@ class Parser:
             self._stop = at + 1
 
     def _pass(self, chunk: Chunk) -> None:
-        """Go on behind a chunk that is not right."""
         if self._is_lost:
             return
         self._go_to(chunk.offset + chunk.size)  # SALV-01
@@ -237,7 +235,7 @@ class Parser:
         return self._data[pos : pos + stop - start]
 
     def _read_next(self) -> Event | None:
-        """The thing that begins at ``at``; raises FormatError where it is not whole."""
+        """The thing at ``at``; raises FormatError if it is not intact."""
         if self._parts is not None:
             return self._continue_large(*self._parts)
         if self.state == PACKETS:
@@ -265,26 +263,30 @@ class Parser:
 
     def _read_chunk(self, at: int) -> Event:
         header = self._bytes(at, at + HEADER.size, "a chunk header")
-        chunk = self._chunk = parse_header(header, at)
+        chunk = self._chunk = parse_chunk_header(header, at)
         if chunk.length is None:
             event = ChunkEvent(chunk, header, OPEN_DATA)
             self.at = event.end
-            found = self._place(event)
+            placed = self._place(event)
             if chunk.flags:  # CHUNK-10, PACK-10
                 error = FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on an open DATA")
                 return Fault(at, error, chunk, event)
-            return found
+            return placed
         end = self._tried = at + chunk.size
         if self.size is not None and end > self.size:  # CHUNK-05
             raise TruncatedError(f"chunk {chunk.label} ends at {end}, {self._name} at {self.size}")
         return self._read_payload(chunk, self._want(chunk))
 
-    def _read_payload(self, chunk: Chunk, wanted: int) -> Event:
+    def _read_payload(self, chunk: Chunk, most_bytes: int) -> Event:
         """The chunk, checked as far as it is read."""
         assert chunk.length is not None
         at, end = chunk.offset, chunk.offset + chunk.size
-        kept = chunk.size if wanted == ALL else HEADER.size + min(max(0, wanted), chunk.length)
-        if wanted == ALL or (self._check and wanted != PASS):
+        kept = (
+            chunk.size
+            if most_bytes == WHOLE
+            else HEADER.size + min(max(0, most_bytes), chunk.length)
+        )
+        if most_bytes == WHOLE or (self._check and most_bytes != UNCHECKED):
             if chunk.length > self.profile.chunk_bytes:
                 self._pass(chunk)
                 limit = self.profile.chunk_bytes  # CHUNK-04, LIMIT-07
@@ -306,7 +308,7 @@ class Parser:
         return self._place(ChunkEvent(chunk, data, thing_of(chunk)))
 
     def _continue_large(self, event: ChunkEvent, crc: int) -> Event:
-        """A large chunk, of which no more is kept than the part that was fed last."""
+        """A large chunk, of which only the part fed last is kept."""
         chunk = event.chunk
         covered = chunk.offset + chunk.size - CRC.size
         part = self._data[self.at - self._start : covered - self._start]
@@ -322,7 +324,6 @@ class Parser:
         return self._place(event)
 
     def _place(self, event: ChunkEvent) -> Event:
-        """The chunk, or the Fault that it may not stand where it does."""
         rows, state = GRAMMAR[event.thing], self.state
         self.state = rows.get(state) or state_after_misplaced(event.thing, state)
         self._index = event.chunk if event.thing == "INDX" else None
@@ -385,30 +386,30 @@ class Parser:
         return count == 0
 
     def _skip(self, count: int) -> None:
-        """Pass over so many packets that did not come; raises FormatError."""
+        """Skip so many missing packets; raises FormatError."""
 
     def _due(self) -> int:
         if not self._is_told:  # PACK-14
-            raise FormatError(f"packet at {self.at}: none before it in its DATA tells its frame")
+            raise FormatError(f"packet at {self.at}: none before it in its DATA states its frame")
         return self._number
 
     def _mask(self) -> bytes:
-        """The mask of the segment of signal 0 that was told last in the open DATA."""
+        """The mask of the last segment of signal 0 in the open DATA."""
         if self._implied is None:
-            self._implied = mask_of(self._told)  # PACK-20
+            self._implied = mask_of(self._mask_segment)  # PACK-20
         return self._implied
 
     def _count_frames(self, event: PacketEvent) -> None:
-        """Tell which frames are in a packet; raises FormatError."""
+        """Count the frames of a packet; raises FormatError."""
         packet = event.packet
         if packet.kind == FRAME:
             event.number, event.is_masked = self._number, self._is_masked
             self._number += 1
         elif packet.kind == SEGMENT:
             was_told, self._is_told = self._is_told, False
-            header, _ = parse_segment(packet.body)
+            header, _ = parse_segment_header(packet.body)
             if header.signal == 0:
-                self._told, self._is_masked = packet.body, bool(header.flags & MASKS)
+                self._mask_segment, self._is_masked = packet.body, bool(header.flags & MASKS)
                 self._implied = None if self._is_masked else b""
                 self._number = header.stop
             self._is_told = was_told or header.signal == 0

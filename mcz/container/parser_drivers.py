@@ -1,4 +1,4 @@
-"""Drivers of a parser: they read what it needs, from a file or from a stream that goes on."""
+"""Drivers of a parser: they read its input from a file or from a growing stream."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from mcz.container.grammar import (
     FootEvent,
     PacketEvent,
 )
-from mcz.container.parser import PASS, Parser
+from mcz.container.parser import UNCHECKED, Parser
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError
 
-MOST_AT_ONCE = 64 * 1024  # bytes that are taken from a stream where it has them
+MOST_AT_ONCE = 64 * 1024  # bytes that are read from a stream at a time, if available
 
 
 def events(source: ByteSource, parser: Parser) -> Iterator[Event]:
@@ -53,11 +53,11 @@ def sound_events(
 
 
 def chunks(source: ByteSource, at: int = 0, state: str = UNSIGNED) -> Iterator[tuple[Chunk, int]]:
-    """The chunks from ``at`` on, and where each ends; raises FormatError at a fault.
+    """The chunks from ``at`` on, and the end of each; raises FormatError at a fault.
 
-    Of their payloads packets alone are read.
+    Only payloads of packets are read.
     """
-    parser = Parser(source.size, at=at, state=state, want=lambda _: PASS)
+    parser = Parser(source.size, at=at, state=state, want=lambda _: UNCHECKED)
     for event in sound_events(source, parser):
         if not isinstance(event, FootEvent) and parser.state != PACKETS:
             yield event.chunk, event.end
@@ -94,9 +94,9 @@ def repeated_chunks(payload: bytes, offset: int) -> list[ChunkEvent]:
 
 
 class Stream:
-    """A stream that is read front to back; it need not be seekable, and its end is not known.
+    """A stream that is read front to back; it need not be seekable, and its end is unknown.
 
-    ``size`` counts the bytes that came. Nothing is waited for that the parser does not need yet.
+    ``size`` counts the received bytes. It waits only for bytes that the parser needs.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -104,7 +104,7 @@ class Stream:
         self.size = 0
 
     def events(self, parser: Parser) -> Iterator[Event]:
-        """The events of the stream, each as soon as its bytes are there."""
+        """The events of the stream, each as soon as its bytes arrive."""
         return _drive(parser, lambda: self._feed(parser))
 
     def _feed(self, parser: Parser) -> None:

@@ -1,8 +1,8 @@
 """The records of the chunks. SPEC.md has one table for each; a test compares them.
 
-Not that of DATA, which is bulk and read by hand: ``segments.py``; ``packets.py`` where it is open.
+DATA is bulk and parsed by hand in ``segments.py``, and in ``packets.py`` where it is open.
 
-Readers ignore ``extension``: the end of a payload, or sized behind flag bit 7. Rewriting keeps it.
+Readers ignore ``extension``: the end of a payload, or sized after flag bit 7. Rewriting keeps it.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ class Joint(Record):
 
 
 class SkeletonSource(Record):
-    """The file that a skeleton came of, in SKEL."""
+    """The source file of a skeleton, in SKEL."""
 
     template: bytes = field(ID, "id of the SRCE chunk that holds the text")
     format: int = field(Int8ul, "source format id")
@@ -197,7 +197,7 @@ OF_CLIP, OF_SKELETON, OF_ATTACHMENT = 0, 1, 2
 
 
 class Alia(Record):
-    """ALIA, another file with the content of one that is there."""
+    """ALIA, another file with the content of a stored one."""
 
     name: str = field(TEXT, "relative path of the file")
     of: int = field(
@@ -208,7 +208,7 @@ class Alia(Record):
 
 
 class ClipSource(Record):
-    """The file that a clip came of, in CLIP."""
+    """The source file of a clip, in CLIP."""
 
     flags: int = field(flags(extended=True), "bit 7: has extension", default=0)
     template: bytes = field(ID, "id of the SRCE chunk")
@@ -229,8 +229,8 @@ class GridRun(Record):
 
 def grid_runs(grids: Sequence[Grid]) -> list[GridRun]:
     """The runs of the grids of all channels."""
-    found = ((grid, len(list(run))) for grid, run in groupby(grids))
-    return [GridRun(n_channels=count, grid=grid) for grid, count in found]
+    runs = ((grid, len(list(run))) for grid, run in groupby(grids))
+    return [GridRun(n_channels=count, grid=grid) for grid, count in runs]
 
 
 GROUP_ALL, GROUP_JOINT, GROUP_CHANNEL, GROUP_LISTED = range(4)
@@ -250,7 +250,7 @@ class Groups(Record):
 
 
 OWN_CHANNELS = 1
-MOTION, TIMES, RESIDUALS = 1, 2, 3  # roles that rules speak of; the registry has all
+MOTION, TIMES, RESIDUALS = 1, 2, 3  # roles with rules of their own; the registry has all
 
 
 class Signal(Record):
@@ -289,7 +289,7 @@ OPEN_CLIP, ROUNDED_RATE, HAS_TIME_BASE = 1, 2, 4
 
 
 class MissingRun(Record):
-    """Frame numbers that no frame of the clip has, in TIME_BASE and CEND."""
+    """Frame numbers without a frame in the clip, in TIME_BASE and CEND."""
 
     frames: int = field(POSITIVE, "frames after the run before, or from the first, at least 1")
     length: int = field(POSITIVE, "frame numbers that are missing then, at least 1")  # TIME-01
@@ -315,7 +315,7 @@ class Metadata(Record):
 
 
 def metadata_records(pairs: Mapping[str, str]) -> list[Metadata]:
-    """The pairs as CLIP and QUAL have them."""
+    """The pairs as records of CLIP and QUAL."""
     return [Metadata(key=key, value=value) for key, value in pairs.items()]
 
 
@@ -325,7 +325,7 @@ def metadata_pairs(records: Sequence[Metadata]) -> dict[str, str]:
 
 
 class Clip(Record):
-    """CLIP, all that is known of a clip before its data."""
+    """CLIP, all facts of a clip that precede its data."""
 
     needs_major: int = field(
         Int8ul, "least format version that reads the clip, major", default=FORMAT[0]
@@ -357,7 +357,7 @@ class Clip(Record):
 
 
 class Cend(Record):
-    """CEND, all that is known of a clip behind its data."""
+    """CEND, all facts of a clip that follow its data."""
 
     n_frames: int = field(UVARINT, "frames of the clip")
     missing: list[MissingRun] = field(

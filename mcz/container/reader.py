@@ -1,7 +1,7 @@
 """Random access to the parts of a file through its Directory.
 
-Opening reads the end of the file and no more than it must; a file without INDX is scanned.
-SPEC.md, "Strict reading" and "Salvage", are normative.
+Opening reads only the end of the file; a file without INDX is scanned. SPEC.md, "Strict reading"
+and "Salvage", are normative.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from mcz.container.segments import (
     StreamTable,
     frame_table,
     mask_of,
-    parse_table,
+    parse_stream_table,
 )
 from mcz.container.skeletons import read_skeleton
 from mcz.container.source import ByteSource, Overlay
@@ -59,18 +59,18 @@ from mcz.model.motion import Skeleton
 from mcz.model.schema import parse, parse_until
 from mcz.model.types import Settings
 
-_said = attrgetter(
+_row_text = attrgetter(
     "name", "skeleton", "n_frames", "rate_numerator", "rate_denominator", "signals"
-)  # that CLIP and the index say of a clip
-KEPT_SKELETONS = 8  # parsed ones, of a file
+)  # fields of a clip in both CLIP and the index
+KEPT_SKELETONS = 8  # parsed skeletons of a file
 TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
 
 
 class Container:
     """An open file. ``unverified`` counts the segments of which only a part was read.
 
-    That happens where ``reads_parts`` allows it, and never otherwise. ``directory``: that of a file
-    which is not finished, as its writer has it.
+    That happens only where ``reads_parts`` allows it. ``directory`` may come from the writer of a
+    file that is not finished.
     """
 
     def __init__(
@@ -87,10 +87,10 @@ class Container:
         self.source, self.salvage, self.verify = source, salvage, verify
         self.reads_parts = reads_parts and not salvage
         self.max_decoded = output_limit(source.size) if max_decoded is None else max_decoded
-        self.threads = threads  # that may decode; None: as many as are in force
+        self.threads = threads  # for decoding; None: the limit of ``threads``
         self.damage: list[str] = []
         self.broken: list[tuple[int, Chunk | None]] = []
-        self.feet: list[int] = []  # offsets of FOOTs, as far as salvage found them
+        self.feet: list[int] = []  # offsets of FOOTs found by salvage
         self.unverified = 0
         self.runs = DecodedCache()
         self.index: Foot | None = None
@@ -105,21 +105,21 @@ class Container:
         return _reopen, (self.source, {n: getattr(self, n) for n in names})
 
     def strictly(self) -> Container:
-        """The same file, of which all that is read is checked as in a sound one."""
+        """The same file, checked as a sound one wherever it is read."""
         other = Container.__new__(Container)
         other.__dict__.update(self.__dict__ | {"salvage": False, "verify": True})
         return other
 
     def _salvage(self) -> Directory:
-        self.source, found, notes = scan_for_salvage(self.source)
-        self.damage = notes + found.damage
-        self.broken, self.feet = found.broken, found.feet
-        return found.directory
+        self.source, scanned, notes = scan_for_salvage(self.source)
+        self.damage = notes + scanned.damage
+        self.broken, self.feet = scanned.broken, scanned.feet
+        return scanned.directory
 
     def _open(self) -> Directory:
         tail_size = min(self.source.size, self.source.tail)
         tail = self.source.read(self.source.size - tail_size, tail_size)
-        if not self.source.remote:  # where requests cost, INDX's copy of HEAD must do
+        if not self.source.remote:  # where requests are slow, INDX's copy of HEAD suffices
             check_signature(self.source)
         foot = self._read_foot(tail)
         if not foot.index_length:
@@ -129,11 +129,11 @@ class Container:
         directory = self._read_directory(foot, tail)
         directory.end = self.source.size
         if head not in (None, directory.head):
-            raise FormatError("HEAD is not what the index says")
+            raise FormatError("HEAD differs from the index")
         return directory
 
     def _read_head(self) -> bytes:
-        """The payload of HEAD; raises UnsupportedError: behind it nothing is known then."""
+        """The payload of HEAD; raises UnsupportedError, since nothing after it is known then."""
         head = read_chunk(self.source, len(SIGNATURE))
         if head.type != ChunkType.HEAD:
             raise FormatError(f"the first chunk is {head.label}, not HEAD")
@@ -148,7 +148,7 @@ class Container:
             foot = parse_foot(tail[-FOOT.size :], at)
         if foot is None:
             check_signature(self.source)  # STRICT-01
-            scan(self.source)  # finds where, and the last FOOT, and raises
+            scan(self.source)  # finds the place and the last FOOT, and raises
             raise TruncatedError(f"the file ends at {self.source.size} without a FOOT")
         return foot
 
@@ -174,7 +174,6 @@ class Container:
 
     @cached_property
     def _records(self) -> Placed:
-        """META records of each name, read once."""
         chunks = self.directory.clips.ancillary(ChunkType.META)
         return read_records(chunks, self.payload, self.source.size, lenient=self.salvage)
 
@@ -185,7 +184,7 @@ class Container:
         return [record for at, record in self._records.get(name, ()) if at > start]
 
     def metadata(self, row: ClipRow) -> dict[str, str]:
-        """Metadata of a clip: those in CLIP, updated by META chunks behind it."""
+        """Metadata of a clip from CLIP, updated by later META chunks."""
         return apply_records(self._said.of(row, self.payload), self.metadata_records(row.name))
 
     def copies(self) -> list[Chunk]:
@@ -193,11 +192,11 @@ class Container:
         return copy_chunks(self.source, self.directory)
 
     def uncopied(self) -> list[Copy]:
-        """Copies of the chunks that the file has behind the last COPY."""
+        """Copies of the chunks after the last COPY."""
         return find_uncopied(self.source, self.directory, self.payload)
 
     def add_shared(self, kind: bytes, payload: bytes) -> None:
-        """Let a damaged file have a SKEL, MODL or SRCE that it has lost: it lies behind its end."""
+        """Add a lost SKEL, MODL or SRCE to a damaged file, past its end."""
         better = self.source if isinstance(self.source, Overlay) else Overlay(self.source, {})
         end = max([self.source.size, *(at + len(part) for at, part in better.parts.items())])
         chunk = build_chunk(kind, payload)
@@ -229,14 +228,14 @@ class Container:
 
     def _find_skeleton(self, id_: bytes) -> tuple[payloads.Skel, Skeleton]:
         """The fields and the skeleton; the last ones are kept, for clips share them."""
-        found = self._skeletons.get(id_)
-        if found is None:
+        entry = self._skeletons.get(id_)
+        if entry is None:
             payload, label = self._shared_payload(ChunkType.SKEL, id_)
-            found = read_skeleton(payload, self.profile, label, f"SKEL {id_.hex()}")
+            entry = read_skeleton(payload, self.profile, label, f"SKEL {id_.hex()}")
             while len(self._skeletons) >= KEPT_SKELETONS:
                 self._skeletons.pop(next(iter(self._skeletons)), None)
-            self._skeletons[id_] = found
-        return found
+            self._skeletons[id_] = entry
+        return entry
 
     def template(self, id_: bytes, format_id: int) -> bytes:
         """The template in the SRCE with this id."""
@@ -246,35 +245,35 @@ class Container:
         return fields.data
 
     def clip(self, row: ClipRow) -> payloads.Clip:
-        """The fields of CLIP, compared with what the index says of them."""
+        """The fields of CLIP, compared with the index."""
         fields = parse_clip(self.payload(row.clip), self.directory.head, row.clip.label)
-        found = ClipRow.of(fields, row.clip)
+        row_of_fields = ClipRow.of(fields, row.clip)
         if fields.flags & payloads.OPEN_CLIP:
             if fields.n_frames:  # CLIP-16
                 raise FormatError(f"clip {row.name!r} is open, but has {fields.n_frames} frames")
-            found.n_frames = row.n_frames
-        differs = _said(found) != _said(row)  # CLIP-17
+            row_of_fields.n_frames = row.n_frames
+        differs = _row_text(row_of_fields) != _row_text(row)  # CLIP-17
         if differs and row.damage and not self.salvage:
             raise FormatError(row.damage[0], clip=row.name)
         if differs and not row.damage:
             raise FormatError(
-                f"clip {row.name!r} is {_said(found)}, but the index says {_said(row)}"
+                f"clip {row.name!r} is {_row_text(row_of_fields)}, in the index {_row_text(row)}"
             )
         return fields
 
     def clip_head(self, row: ClipRow) -> payloads.Clip:
-        """The fields of CLIP before its signals, for a look at many clips."""
+        """The fields of CLIP before its signals, for a quick pass over many clips."""
         return parse_until(payloads.Clip, self.payload(row.clip), row.clip.label, "signals")
 
     def whole_cend(self, row: ClipRow) -> payloads.Cend:
-        """The fields of CEND; raises FormatError where a damaged file has none."""
+        """The fields of CEND; raises FormatError if a damaged file has none."""
         record = self.cend(row)
         if record is None:
             raise FormatError(f"clip {row.name!r} has no CEND")
         return record
 
     def cend(self, row: ClipRow) -> payloads.Cend | None:
-        """The fields of CEND; None where a salvaged clip has none."""
+        """The fields of CEND; None if a salvaged clip has none."""
         if row.cend is None:
             return None
         fields = parse(payloads.Cend, self.payload(row.cend), row.cend.label)
@@ -288,7 +287,7 @@ class Container:
         return join_parts(row, self.payload)
 
     def table(self, row: SegmentRow, counts: StreamCounts) -> StreamTable:
-        """The stream table of a segment, with as little read as will do."""
+        """The stream table of a segment, with as few reads as possible."""
         self._check_row(row)
         if row.packet == FRAME:
             return frame_table(row.header, counts, row.size, len(self._implied_mask(row)))
@@ -304,21 +303,21 @@ class Container:
         self,
         row: SegmentRow,
         counts: StreamCounts,
-        wanted: Sequence[int] | None,
+        indices: Sequence[int] | None,
         table: StreamTable | None = None,
     ) -> tuple[StreamTable, dict[int, bytes]]:
-        """At least the streams with the indices ``wanted`` (None: all) of a segment.
+        """At least the streams with these ``indices`` (None: all) of a segment.
 
-        ``table`` is that of the segment where it was read before.
-        All that holds the segment is read and checked (CHUNK-03), unless parts may be.
+        ``table`` is the table of the segment if it was read before. Everything in the segment is
+        read and checked (CHUNK-03), unless parts may be.
         """
         self._check_row(row)
-        if wanted is None or not self.in_part(row):
+        if indices is None or not self.in_part(row):
             return self._all_streams(row, counts)
         table = table or self.table(row, counts)
         self.unverified += 1  # CHUNK-07
         got: dict[int, bytes] = {}
-        for run in table.runs(sorted(wanted), self.source.gap):
+        for run in table.runs(sorted(indices), self.source.gap):
             start = table.offsets[run[0]]
             stop = table.offsets[run[-1]] + table.lengths[run[-1]]
             data = self.source.read(row.offset + start, stop - start)
@@ -328,7 +327,7 @@ class Container:
         return table, got
 
     def in_part(self, row: SegmentRow) -> bool:
-        """Return True if parts of a segment are read alone: not if one request gets it all."""
+        """Return True if parts of a segment are read alone: not if one request returns it all."""
         return self.reads_parts and row.packet != FRAME and row.size > self.source.gap
 
     def _all_streams(
@@ -360,13 +359,13 @@ class Container:
         return body
 
     def _implied_mask(self, row: SegmentRow) -> bytes:
-        if row.told is None:
+        if row.mask_row is None:
             return b""
         offset, mask = self._told
-        if offset != row.told.offset:
+        if offset != row.mask_row.offset:
             offset, mask = self._told = (
-                row.told.offset,
-                mask_of(self._read_packet(row.told)),
+                row.mask_row.offset,
+                mask_of(self._read_packet(row.mask_row)),
             )  # PACK-20
         return mask
 
@@ -381,7 +380,7 @@ class Container:
 
 
 def _reopen(source: ByteSource, options: Settings) -> Container:
-    """Reopen the file of a pickled Container; it is closed when it is released."""
+    """Reopen the file of a pickled Container; it is closed with the Container."""
     try:
         container = Container(source, **options)
     except BaseException:
@@ -392,16 +391,16 @@ def _reopen(source: ByteSource, options: Settings) -> Container:
 
 
 def _parse_table(data: bytes, row: SegmentRow, counts: StreamCounts) -> StreamTable:
-    """The table of a segment, of which ``data`` may have too little: that is a TruncatedError."""
+    """The table of a segment; raises TruncatedError if ``data`` is too short."""
     try:
-        table = parse_table(data, counts)
+        table = parse_stream_table(data, counts)
     except TruncatedError as error:
         if len(data) < row.size:
             raise
         raise FormatError(f"DATA payload at {row.offset}: {error}", offset=row.offset) from None
     if table.header != row.header:
         raise FormatError(
-            f"segment at {row.offset} is {table.header}, but the index says {row.header}",
+            f"segment at {row.offset} is {table.header}, in the index {row.header}",
             offset=row.offset,
         )
     if table.payload_size != row.size:  # DATA-01

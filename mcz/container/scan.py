@@ -1,8 +1,8 @@
-"""The scan of a file: the way to a Directory without, or in spite of, INDX.
+"""The scan of a file: builds a Directory without, or in spite of, INDX.
 
-A strict scan raises at the first fault. A salvaging one notes it, and goes on with the next event;
-``Bounds`` decides which clip a part behind lost bytes belongs to. SPEC.md, "Grammar" and "Salvage",
-are normative.
+A strict scan raises at the first fault. A salvaging scan notes it, and continues with the next
+event; ``Bounds`` decides which clip a part after lost bytes belongs to. SPEC.md, "Grammar" and
+"Salvage", are normative.
 """
 
 from __future__ import annotations
@@ -34,28 +34,28 @@ from mcz.container.scanner import Scanner
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 
-LEAST_BETWEEN = 2 * FRAMING  # bytes in which a CEND and the next CLIP can have been
+LEAST_BETWEEN = 2 * FRAMING  # least number of bytes with a CEND and the next CLIP
 Owners = Mapping[tuple[int, int], str]  # offset and size of segments and CENDs -> name of the clip
 NOBODY: Owners = MappingProxyType({})
 
 
 class Bounds:
-    """Knowledge of the end of the clip that is open; ``owners``: that of an index.
+    """Knowledge of the end of the open clip; ``owners``: the ones of an index.
 
-    ``doubt``: it may have ended, and another one have begun, in bytes that are lost.
+    ``doubt``: it may have ended, and another one begun, in lost bytes.
     """
 
     def __init__(self, owners: Owners) -> None:
         self.owners = owners
         self.doubt = False
-        self._fault: int | None = None  # where what cannot be taken in began, up to here
+        self._fault: int | None = None  # start of the present unusable bytes
 
     def begin(self) -> None:
         """Note that a clip begins or ends here."""
         self.doubt = False
 
     def begin_fault(self, at: int) -> None:
-        """Note that what lies at ``at`` cannot be taken in."""
+        """Note that the thing at ``at`` is unusable."""
         self._fault = at if self._fault is None else self._fault
 
     def skip(self, to: int) -> bool:
@@ -64,24 +64,24 @@ class Bounds:
         return self.doubt
 
     def is_sound(self) -> None:
-        """Note that what followed was taken in."""
+        """Note that the following thing was usable."""
         self._fault = None
 
     def settle(self, payload: bytes, offset: int, own: bytes) -> bool:
-        """Let the REPT with ``payload`` tell; return False where it is in another clip.
+        """Resolve the doubt by the REPT with ``payload``; return False if it is in another clip.
 
-        ``offset``: where that begins; ``own``: the payload of the CLIP that is open.
+        ``offset``: its place; ``own``: the payload of the CLIP that is open.
         """
         try:
             chunks = repeated_chunks(payload, offset)
-        except FormatError:  # what is no REPT says nothing
+        except FormatError:  # a bad REPT resolves nothing
             return True
         clips = [event.payload for event in chunks if event.chunk.type == ChunkType.CLIP]
         self.doubt = clips != [own]
         return not clips or clips == [own]
 
     def check(self, clip: str, kind: str, offset: int, size: int) -> None:
-        """Raise FormatError for what may belong to another clip than ``clip``."""
+        """Raise FormatError for a part that may belong to another clip than ``clip``."""
         owner = self.owners.get((offset, size))
         if owner == clip:
             self.doubt = False
@@ -94,11 +94,11 @@ class Bounds:
 def scan(
     source: ByteSource, *, salvage: bool = False, whole: bool = False, owners: Owners = NOBODY
 ) -> Found:
-    """Scan the file. ``whole`` also checks the crc of every chunk (salvage always does) and,
-    unless salvaging, what is in it and whether INDX agrees with it; ``owners``: see ``Bounds``.
+    """Scan the file; ``owners``: see ``Bounds``.
 
-    Raises FormatError at the first fault unless ``salvage``; a TruncatedError carries the end
-    of the last valid FOOT.
+    ``whole`` also checks the crc of every chunk (salvage always does) and, unless salvaging, the
+    contents of chunks and of INDX. Raises FormatError at the first fault unless ``salvage``; a
+    TruncatedError carries the end of the last valid FOOT.
     """
 
     def payload(chunk: Chunk) -> bytes:
@@ -120,18 +120,18 @@ def scan(
 
 
 class Salvager(Scanner):
-    """A salvaging scan: it notes what is wrong, and takes in what it can."""
+    """A salvaging scan: it notes faults, and uses what it can."""
 
     def __init__(self, size: int, bounds: Bounds) -> None:
         super().__init__(size)
         self.strict = False
         self._bounds = bounds
         self._opening = b""  # the payload of the CLIP that is open
-        self._is_draining = False  # a packet was wrong: those behind it are passed over
-        self._is_lost = False  # bytes before the next event are not known
+        self._is_draining = False  # after a bad packet, later ones are skipped
+        self._is_lost = False  # bytes before the next event are unknown
 
     def take(self, event: Event) -> None:
-        """Take an event in; what is wrong is noted."""
+        """Process an event; faults are noted."""
         if self._is_lost:
             self._is_lost = False
             if isinstance(event, Fault) and event.offset == self._size:
@@ -149,7 +149,7 @@ class Salvager(Scanner):
             except FormatError as error:
                 of_head = getattr(getattr(event, "chunk", None), "type", b"") == ChunkType.HEAD
                 if of_head and isinstance(error, UnsupportedError):
-                    raise  # nothing is known of a file of another version
+                    raise  # other versions are unreadable
                 self._note(error)  # SALV-03
                 self._skip(event)
             else:
@@ -159,7 +159,7 @@ class Salvager(Scanner):
             self.parser.state = BODY if self.clip is None else CLIP
 
     def _take_misplaced(self, fault: Fault) -> None:
-        """Take in what is whole and not where it may be; raises what cannot be taken in."""
+        """Use an intact thing at a wrong place; raises an error if it cannot."""
         event, chunk = fault.event, fault.chunk
         if isinstance(event, FootEvent):
             self._close_clip()  # GRAM-01
@@ -187,7 +187,7 @@ class Salvager(Scanner):
         raise fault.error
 
     def _is_repeated(self, event: ChunkEvent) -> bool:
-        """Return True for a chunk in a REPT with a damaged header: the open clip goes on."""
+        """Return True for a chunk in a REPT with a damaged header: the open clip continues."""
         kind = event.chunk.type
         if kind not in REPEATED:
             return False
@@ -207,13 +207,12 @@ class Salvager(Scanner):
             self.clip.damage.append(str(error))
 
     def _skip(self, event: Event) -> None:
-        """Go on behind what cannot be taken in."""
         fault = event if isinstance(event, Fault) else None
         inner, chunk = (fault.event if fault else event), getattr(event, "chunk", None)
         if not event.offset or (
             self.parser.is_done and fault and isinstance(fault.error, LimitError)
         ):
-            return  # the signature, or the end of a search that was given up
+            return  # the signature, or the end of an exhausted search
         self.found.broken.append((event.offset if chunk is None else chunk.offset, chunk))
         if isinstance(inner, FootEvent):
             self._search(inner.offset, inner.offset + 1)
@@ -226,7 +225,7 @@ class Salvager(Scanner):
             self._is_lost = fault is not None and fault.is_lost
 
     def _search(self, fault: int, at: int) -> None:
-        """Look from ``at`` on for what is whole; what is not began at ``fault``."""
+        """Search from ``at`` on for an intact thing; unusable bytes began at ``fault``."""
         self._bounds.begin_fault(fault)
         self.parser.search(at)  # SALV-02
         self._is_lost = True
@@ -241,7 +240,7 @@ class Salvager(Scanner):
             return
         self._is_draining = False
 
-    # What is taken in, in other ways --------------------------------------------
+    # Salvaged parts, used in other ways ----------------------------------------
 
     def _begin_clip(self, chunk: Chunk, payload: bytes) -> None:
         self._bounds.begin()
@@ -277,22 +276,22 @@ class Salvager(Scanner):
         super()._ancillary(chunk, payload)
 
     def _repeat(self, chunk: Chunk, payload: bytes) -> None:
-        """Take in the chunks of a REPT: of a clip that is open, those that may have been lost."""
-        held = self.found.directory
+        """Use the chunks of a REPT: of the open clip, those that may have been lost."""
+        directory = self.found.directory
         own = b"" if self.clip is None else self._opening
         if self._bounds.doubt and not self._bounds.settle(payload, chunk.offset, own):
             self._close_clip()
         if self.clip is None:
             for inner in repeated_chunks(payload, chunk.payload_offset):
-                if inner.thing != "HEAD" or not held.head:
+                if inner.thing != "HEAD" or not directory.head:
                     self._handlers[inner.thing](inner.chunk, inner.payload)
         elif self.found.damage:
-            with suppress(FormatError):  # what is no REPT says nothing
+            with suppress(FormatError):  # a bad REPT is skipped
                 for inner in repeated_chunks(payload, chunk.payload_offset):
                     if inner.thing in ("SKEL", "MODL"):
                         kind = inner.chunk.type
                         key = kind, chunk_id(kind, inner.payload)
-                        held.shared.setdefault(key, inner.chunk)
+                        directory.shared.setdefault(key, inner.chunk)
 
     def finish(self) -> None:
         self._close_clip()

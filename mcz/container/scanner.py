@@ -1,4 +1,4 @@
-"""A strict scan: what the events of a file say, checked and gathered, up to the first fault.
+"""A strict scan: the events of a file, checked and collected, up to the first fault.
 
 SPEC.md, "Grammar" and "Strict reading", are normative.
 """
@@ -23,8 +23,8 @@ from mcz.container.grammar import NAMED, OTHER, ChunkEvent, Event, Fault, FootEv
 from mcz.container.index_reader import IndexCheck
 from mcz.container.limits import check, index_limit
 from mcz.container.packets import SEGMENT
-from mcz.container.parser import ALL, PASS, Parser
-from mcz.container.segments import GROUP_NOTES, parse_header
+from mcz.container.parser import UNCHECKED, WHOLE, Parser
+from mcz.container.segments import GROUP_NOTES, parse_segment_header
 from mcz.container.strict import check_plain
 from mcz.errors import FormatError, LimitError
 from mcz.model.schema import parse
@@ -35,16 +35,16 @@ Payloads = Callable[[Chunk], bytes]
 
 
 class Scanner:
-    """A strict scan, which takes the events of its parser.
+    """A strict scan of the events of a parser.
 
-    ``size`` is that of the file, None where it comes as a stream: what was read is let go then, and
-    INDX and COPY are not compared with it. ``payload_of`` reads what lies before.
+    ``size`` is the size of the file, None for a stream: then processed bytes are dropped, and INDX
+    and COPY are not compared with the file. ``payload_of`` reads earlier payloads.
     """
 
     def __init__(
         self, size: int | None, *, whole: bool = True, payload_of: Payloads | None = None
     ) -> None:
-        self.parser = Parser(size, want=self._wanted, check=whole)
+        self.parser = Parser(size, want=self._needed_bytes, check=whole)
         self.found = Found()
         self.strict = whole
         self.clip: ClipRow | None = None
@@ -53,8 +53,8 @@ class Scanner:
         self._indexes = IndexCheck()
         self._templates: dict[bytes, int] = {}  # the source format of each SRCE
         self._model_bytes = 0
-        self._told: SegmentRow | None = None  # whose mask frames of the open DATA have
-        self._sourced: set[tuple[int, bytes]] = set()  # what aliases may stand for
+        self._mask_row: SegmentRow | None = None  # has the mask of frames of the open DATA
+        self._sourced: set[tuple[int, bytes]] = set()  # possible targets of aliases
         self._handlers: dict[str, Callable[[Chunk, bytes], None]] = {
             "HEAD": self._head,
             "SKEL": self._shared,
@@ -69,15 +69,15 @@ class Scanner:
             OTHER: self._ancillary,
         }
 
-    def _wanted(self, chunk: Chunk) -> int:
+    def _needed_bytes(self, chunk: Chunk) -> int:
         if self._whole:
-            return ALL
+            return WHOLE
         if chunk.type == ChunkType.DATA:
             return PEEK
-        return ALL if chunk.type in NAMED else PASS
+        return WHOLE if chunk.type in NAMED else UNCHECKED
 
     def take(self, event: Event) -> None:
-        """Take an event in; raises FormatError for a Fault, and for what breaks another rule."""
+        """Process an event; raises FormatError for a Fault, and for other broken rules."""
         try:
             if isinstance(event, Fault):
                 raise event.error
@@ -101,10 +101,10 @@ class Scanner:
             self.found.chunks.append(event.chunk)
 
     def finish(self) -> None:
-        """Learn that nothing follows."""
+        """Note that nothing follows."""
 
     def forget(self) -> None:
-        """Let go of where chunks and segments lie, as is of no use in a stream."""
+        """Drop the places of chunks and segments, which are useless in a stream."""
         self.found.chunks.clear()
         self.found.ends.clear()
         if self.clip is not None:
@@ -187,7 +187,7 @@ class Scanner:
 
     def _data(self, chunk: Chunk, payload: bytes) -> None:
         assert chunk.length is not None
-        header, _ = parse_header(payload)
+        header, _ = parse_segment_header(payload)
         self._segment(SegmentRow(chunk.payload_offset, chunk.length, header))
 
     def _packet(self, event: PacketEvent) -> None:
@@ -195,9 +195,9 @@ class Scanner:
         if header is not None:
             row = SegmentRow(event.body, len(packet.body), header, packet.kind)
             if event.is_masked:
-                row = replace(row, told=self._told)
+                row = replace(row, mask_row=self._mask_row)
             elif packet.kind == SEGMENT and header.signal == 0:
-                self._told = row
+                self._mask_row = row
             self._segment(row)
             return
         self.found.ends[event.chunk.offset] = event.end
@@ -227,7 +227,7 @@ class Scanner:
             raise error
 
     def _close_clip(self) -> list[FormatError]:
-        """Let the open clip end here; return what is wrong with its signals."""
+        """End the open clip; return the faults of its signals."""
         clip, self.clip = self.clip, None
         assert clip is not None
         self.found.directory.clips[clip.name] = clip

@@ -75,7 +75,7 @@ class StreamTable:
     offsets: tuple[int, ...]
     lengths: tuple[int, ...]
     extension: bytes = b""
-    _codec_start: int = slot(init=False, repr=False, compare=False)  # asked for each stream
+    _codec_start: int = slot(init=False, repr=False, compare=False)  # needed for each stream
 
     def __post_init__(self) -> None:
         n_coded = self.counts.n_groups * self.counts.n_resolutions
@@ -86,7 +86,7 @@ class StreamTable:
         return self.size + sum(self.lengths)
 
     def frame_notes(self) -> int | None:
-        """Index of the frame notes, None where the segment has none."""
+        """Index of the frame notes, None if the segment has none."""
         return 0 if self.header.flags & FRAME_NOTES else None
 
     def group_notes(self, group: int) -> int | None:
@@ -103,11 +103,11 @@ class StreamTable:
         """Index of the codec's stream; resolution 0 is the coarsest here, as stored."""
         return self._codec_start + resolution * self.counts.n_groups + group
 
-    def runs(self, wanted: Sequence[int], gap: int) -> list[list[int]]:
-        """The streams ``wanted``, ascending, in runs to be read at once; empty ones join any."""
+    def runs(self, indices: Sequence[int], gap: int) -> list[list[int]]:
+        """The streams ``indices``, ascending, in runs to be read together; empty ones join any."""
         runs: list[list[int]] = []
         end = 0
-        for index in wanted:
+        for index in indices:
             if runs and self.offsets[index] - end <= gap:
                 runs[-1].append(index)
             else:
@@ -117,9 +117,9 @@ class StreamTable:
 
 
 def build_segment(header: SegmentHeader, streams: Sequence[bytes], extension: bytes = b"") -> bytes:
-    """The DATA payload; ``streams`` in stored order, absent kinds left out.
+    """The DATA payload; ``streams`` in stored order, without absent kinds.
 
-    ``extension`` is written where the flags of ``header`` say that there is one.
+    ``extension`` is written if the flags of ``header`` include it.
     """
     present = bytearray((len(streams) + 7) // 8)
     for index, stream in enumerate(streams):
@@ -137,7 +137,7 @@ def build_segment(header: SegmentHeader, streams: Sequence[bytes], extension: by
     return b"".join((table, struct.pack("<I", zlib.crc32(table)), *streams))
 
 
-def parse_header(data: bytes) -> tuple[SegmentHeader, int]:
+def parse_segment_header(data: bytes) -> tuple[SegmentHeader, int]:
     """The fields before the table and the offset after them, not yet covered by a checksum."""
     at, fields = 0, []
     for _ in range(5):
@@ -158,12 +158,12 @@ def parse_header(data: bytes) -> tuple[SegmentHeader, int]:
     return SegmentHeader(signal, first, n_frames, lead, tail, flags), at + 1
 
 
-def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
+def parse_stream_table(data: bytes, counts: StreamCounts) -> StreamTable:
     """The table at the start of ``data``, which may be cut after it.
 
     Raises TruncatedError where ``data`` ends inside the table.
     """
-    header, at = parse_header(data)
+    header, at = parse_segment_header(data)
     n_streams = counts.total(header.flags)
     bitmap_size = (n_streams + 7) // 8
     if at + bitmap_size > len(data):
@@ -197,13 +197,13 @@ def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
 
 
 def mask_of(segment: bytes) -> bytes:
-    """The mask that packets of kind 2 behind the packet of a ``segment`` imply."""
-    header, _ = parse_header(segment)
+    """The mask that packets of kind 2 after the packet of a ``segment`` imply."""
+    header, _ = parse_segment_header(segment)
     if not header.flags & MASKS:
         return b""
     if header.n_frames != 1:  # PACK-21
         raise FormatError(f"a frame implies the masks of {header.n_frames} frames")
-    table = parse_table(segment, StreamCounts(1, 1))
+    table = parse_stream_table(segment, StreamCounts(1, 1))
     index = table.mask(0) or 0
     return segment[table.offsets[index] : table.offsets[index] + table.lengths[index]]
 
@@ -213,7 +213,7 @@ def frame_table(
 ) -> StreamTable:
     """The table of a packet of kind 2: its body of ``size`` bytes is one stream, its mask implied.
 
-    The mask, where it has one, is the first stream.
+    The mask, if it has one, is the first stream.
     """
     if (counts.n_groups, counts.n_resolutions) != (1, 1):  # PACK-13
         raise FormatError(

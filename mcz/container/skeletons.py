@@ -12,13 +12,13 @@ from mcz.model.schema import build, parse
 from mcz.model.skeleton import AXES, HANDS
 
 ANGLE_UNITS = ("", "deg", "rad")
-MOST_KNOWN, MOST_BYTES = 64, 1 << 16  # skeletons that are kept, and how long a payload may be
+MOST_KNOWN, MOST_BYTES = 64, 1 << 16  # number of kept skeletons, and greatest length of a payload
 _known: dict[tuple[bytes, int], tuple[payloads.Skel, Skeleton]] = {}  # by payload and profile
 AXIS_ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 
 def build_skeleton(skeleton: Skeleton, source: payloads.SkeletonSource | None) -> bytes:
-    """The payload of SKEL; ``source``: the file that it came of."""
+    """The payload of SKEL; ``source``: its source file."""
     record = payloads.Skel(
         name=skeleton.name,
         flags=int(skeleton.intrinsic),
@@ -27,7 +27,7 @@ def build_skeleton(skeleton: Skeleton, source: payloads.SkeletonSource | None) -
         up_axis=AXES.index(skeleton.up_axis),
         forward_axis=AXES.index(skeleton.forward_axis),
         handedness=HANDS.index(skeleton.handedness),
-        base=skeleton.base or None,  # b"": derived, from what is not told
+        base=skeleton.base or None,  # b"": derived from an unknown one
         source=source,
         joints=[_joint_record(joint) for joint in skeleton.joints],
     )
@@ -86,15 +86,15 @@ def read_skeleton(
     The last ones are kept, as the files of a data set often have one skeleton.
     """
     key = payload, profile.id
-    found = _known.get(key)
-    if found is None:
+    entry = _known.get(key)
+    if entry is None:
         fields = parse(payloads.Skel, payload, label, profile.counts)
-        found = fields, parse_skeleton(fields, profile, where)
+        entry = fields, parse_skeleton(fields, profile, where)
         if len(payload) <= MOST_BYTES:
             while len(_known) >= MOST_KNOWN:
                 _known.pop(next(iter(_known)), None)
-            _known[key] = found
-    return found
+            _known[key] = entry
+    return entry
 
 
 def parse_skeleton(fields: payloads.Skel, profile: Profile, where: str) -> Skeleton:

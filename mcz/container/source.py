@@ -1,4 +1,4 @@
-"""Random access to the bytes of a file: on disk, in memory or far away."""
+"""Random access to the bytes of a file: on disk, in memory or on a server."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from mcz.model.types import Target
 
 
 class ByteSource:
-    """Reads ranges of a seekable binary stream and counts what it read.
+    """Reads ranges of a seekable binary stream and counts the bytes.
 
     Threads may share it, and processes after a fork: a file on disk and one on a web server are
-    read at a position of the read's own, other streams are opened anew. With ``target``, what
-    ``open_source`` takes, it can be pickled.
+    read at explicit positions, other streams are opened again. With ``target``, as for
+    ``open_source``, it can be pickled.
 
-    ``gap``: two wanted ranges that lie at most this far apart are read as one. Zero suits a disk;
-    over a network a request costs more than the bytes between. ``tail``: how many bytes at the end
-    are read at once when the file is opened. ``block``: what a ``Forward`` asks for at a time.
+    ``gap``: two requested ranges at most this far apart are read as one. Zero suits a disk; over a
+    network a request costs more than the bytes between. ``tail``: number of bytes at the end that
+    are read together when the file is opened. ``block``: bytes that a ``Forward`` reads at a time.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class ByteSource:
         self._stream = stream
         self._positioned = _is_plain_file(stream)
         self._reads_at = getattr(stream, "read_at", None)  # of an HttpFile
-        self._lock = Lock()  # seek and read belong together, whoever else reads
+        self._lock = Lock()  # seek and read belong together
         self._process = os.getpid()
         self.target = target
         self.gap = 64 * 1024 if remote else 0
@@ -54,7 +54,7 @@ class ByteSource:
         self._held: list[tuple[int, bytes]] = []  # blocks read ahead, newest last
 
     def read(self, offset: int, size: int) -> bytes:
-        """The ``size`` bytes at ``offset``; raises TruncatedError where the file ends before."""
+        """The ``size`` bytes at ``offset``; raises TruncatedError if the file ends before."""
         if offset + size > self.size:
             raise TruncatedError(
                 f"bytes {offset} to {offset + size} are wanted, but the file ends at {self.size}"
@@ -98,7 +98,7 @@ class ByteSource:
     def _read_stream(self, offset: int, size: int) -> bytes:
         try:
             data = self._read_at(offset, size)
-            while len(data) < size:  # raw streams may return less than was asked for
+            while len(data) < size:  # raw streams may return fewer than requested
                 more = self._read_at(offset + len(data), size - len(data))
                 if not more:
                     raise TruncatedError(f"the file ended at {offset + len(data)} while read")
@@ -123,9 +123,9 @@ class ByteSource:
             return self._stream.read(size)
 
     def _forked(self) -> None:
-        """Let this process have what a fork would share: a connection, and a lock perhaps held.
+        """Replace things that a fork would share: a connection, and a lock perhaps held.
 
-        An HttpFile sees to that itself, and knows what it has read of.
+        An HttpFile does that itself, with the identity of its file.
         """
         self._process, self._lock = os.getpid(), Lock()
         if self.remote and self._reads_at is None and isinstance(self.target, str):
@@ -140,7 +140,7 @@ class ByteSource:
         return os.fstat(self._stream.fileno()).st_size if self._positioned else self.size
 
     def up_to(self, size: int) -> ByteSource:
-        """The first ``size`` bytes, as a source of their own of the same stream."""
+        """The first ``size`` bytes, as a separate source of the same stream."""
         return ByteSource(self._stream, name=self.name, size=size, target=self.target)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -155,10 +155,10 @@ class ByteSource:
 
 
 class Overlay(ByteSource):
-    """``source`` with other bytes at some offsets; all else it leaves to ``source``.
+    """``source`` with other bytes at some offsets.
 
-    ``parts`` do not overlap. One that lies behind the end can be read, whole or in part, though
-    ``size`` stays. What is pickled opens ``source`` anew, without them.
+    ``parts`` do not overlap. One after the end can be read, though ``size`` stays. A pickled
+    Overlay opens ``source`` again, without the parts.
     """
 
     def __init__(self, source: ByteSource, parts: Mapping[int, bytes]) -> None:
@@ -172,7 +172,7 @@ class Overlay(ByteSource):
         return getattr(self._source, name)
 
     def read(self, offset: int, size: int) -> bytes:
-        """The ``size`` bytes at ``offset``; raises TruncatedError where the file ends before."""
+        """The ``size`` bytes at ``offset``; raises TruncatedError if the file ends before."""
         stop = offset + size
         first = max(0, bisect_right(self._starts, offset) - 1)
         near = self._starts[first : bisect_left(self._starts, stop)]
@@ -189,7 +189,7 @@ class Overlay(ByteSource):
         return bytes(data)
 
     def with_more(self, parts: Mapping[int, bytes]) -> Overlay:
-        """The same source with ``parts`` beside those that it has."""
+        """The same source with further ``parts``."""
         return Overlay(self._source, self.parts | dict(parts))
 
     def close(self) -> None:
@@ -197,7 +197,7 @@ class Overlay(ByteSource):
 
 
 class Forward:
-    """Reads on from offset ``at`` of a source, a block at a time, where small parts are wanted."""
+    """Reads on from offset ``at`` of a source, a block at a time, for many small parts."""
 
     def __init__(self, source: ByteSource, at: int) -> None:
         self.at = at
@@ -205,12 +205,12 @@ class Forward:
         self._start, self._block = at, b""
 
     def __call__(self, size: int) -> bytes:
-        """The next ``size`` bytes; raises TruncatedError where the file ends before."""
+        """The next ``size`` bytes; raises TruncatedError if the file ends before."""
         self.at += size
         return self.at_offset(self.at - size, size)
 
     def at_offset(self, offset: int, size: int) -> bytes:
-        """The ``size`` bytes at an offset that is not before those read last."""
+        """The ``size`` bytes at an offset that is not before the last ones read."""
         first = offset - self._start
         if first + size > len(self._block):
             block = max(size, min(self._source.block, self._source.size - offset))
@@ -219,7 +219,7 @@ class Forward:
 
 
 def path_of(target: Target) -> str | os.PathLike[str] | None:
-    """The path or address that ``target`` is, for an error; None for bytes and streams."""
+    """The path or address of ``target``, for an error; None for bytes and streams."""
     return target if isinstance(target, (str, os.PathLike)) else None
 
 
@@ -248,7 +248,7 @@ def open_source(target: Target) -> ByteSource:
         address = str(target)
         remote = _remote_stream(address)
         return ByteSource(remote, remote=_is_remote(remote), name=address, target=address)
-    path = str(Path(target).absolute())  # holds wherever the process goes
+    path = str(Path(target).absolute())  # valid after a change of the working folder
     return ByteSource(open(target, "rb"), name=os.fspath(target), target=path)
 
 
@@ -266,14 +266,14 @@ def _remote_stream(target: str) -> Any:
 
 
 def file_system(url: str) -> tuple[Any, str]:
-    """The file system of fsspec that has ``url``, and the path in it.
+    """The file system of fsspec for ``url``, and the path in it.
 
-    Raises OptionError where fsspec, or what it needs for the protocol, is not installed.
+    Raises OptionError if fsspec, or its package for the protocol, is not installed.
     """
     fsspec = import_extra("fsspec", "remote", purpose=url)
     try:
         fs, path = fsspec.core.url_to_fs(url)
-    except (ValueError, ImportError) as error:  # no such protocol, or not installed
+    except (ValueError, ImportError) as error:  # unknown protocol, or not installed
         raise OptionError(str(error), path=url) from None
     except Exception as error:  # each file system has its own errors
         raise _no_access(url, error) from None
@@ -281,7 +281,7 @@ def file_system(url: str) -> tuple[Any, str]:
 
 
 def _no_access(name: str, error: Exception) -> AccessError:
-    """Error of a file that cannot be read, whatever its file system raises."""
+    """Error of a file that cannot be read, from any exception of its file system."""
     text = "no such file" if isinstance(error, FileNotFoundError) else reason_of(error)
     return AccessError(text, path=name)
 

@@ -1,7 +1,7 @@
 """Checks within chunks: of a strict pass, and of files of the profile small.
 
-What only decoding shows is checked where clips are decoded. SPEC.md, "Strict reading", "QUAL",
-"META", "COPY" and "Limits and profiles", are normative.
+Faults that only decoding shows are found where clips are decoded. SPEC.md, "Strict reading",
+"QUAL", "META", "COPY" and "Limits and profiles", are normative.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from mcz.model.numbers import GridKind
 from mcz.model.schema import Record, parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
-# The source formats of the registry, by what they are sources of.
+# The source formats of the registry, by the kind of their content.
 OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset({*range(2, 15), 16})
 
 
@@ -59,7 +59,7 @@ def _check_source(
     templates: Templates,
     others: frozenset[int],
 ) -> None:
-    """``others``: the formats that are known to be of the other sort."""
+    """``others``: the formats of the other kind of content."""
     id_ = bytes(source.template)
     _refer(directory, ChunkType.SRCE, id_, where)  # GRAM-03
     if templates.get(id_, source.format) != source.format:  # CLIP-03, SKEL-04
@@ -75,7 +75,7 @@ def _check_source(
 def check_clip(
     fields: payloads.Clip, where: str, directory: Directory, templates: Templates
 ) -> bool:
-    """Check what CLIP refers to and names; return whether it has a source file."""
+    """Check the references and names of CLIP; return whether it has a source file."""
     _refer(directory, ChunkType.SKEL, fields.skeleton, where)  # GRAM-02
     if fields.source is not None:
         _check_source(fields.source, where, directory, templates, OF_SKELETONS)
@@ -95,7 +95,7 @@ def _refer(directory: Directory, kind: bytes, id_: bytes, where: str) -> None:
 
 
 def check_target(fields: payloads.Alia, where: str, sourced: Collection[tuple[int, bytes]]) -> None:
-    """Check that what an alias stands for is there before it, and can be restored."""
+    """Check that the target of an alias precedes it, and can be restored."""
     if (fields.of, bytes(fields.target)) not in sourced:  # GRAM-04
         raise FormatError(f"chunk {where}: nothing before it with a source is {fields.target!r}")
 
@@ -107,9 +107,9 @@ def check_ancillary(
     found: Found,
     payload_of: Callable[[Chunk], bytes] | None,
 ) -> None:
-    """Check ``chunk`` of a file of ``file_bytes``; ``found`` lies before it. Raises FormatError.
+    """Check ``chunk`` of a file of ``file_bytes``; ``found`` is before it. Raises FormatError.
 
-    Without ``payload_of``, which reads that again, copies are not compared with it.
+    Without ``payload_of``, which reads earlier chunks again, copies are not compared with them.
     """
     if chunk.type == ChunkType.QUAL:
         parse(payloads.Qual, payload, chunk.label)  # QUAL-02
@@ -142,7 +142,7 @@ def check_plain(kind: bytes, payload: bytes, where: str) -> None:
     if packed:  # LIMIT-22
         raise LimitError("the profile small packs nothing", where=where)
     if kind in ABSENT:  # LIMIT-23
-        raise LimitError("the profile small has no such chunk", where=where)
+        raise LimitError("the profile small does not allow this chunk", where=where)
     if kind == ChunkType.CLIP:
         _check_clip(parse(payloads.Clip, payload, where), where)
 

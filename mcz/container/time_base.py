@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.container import payloads
 from mcz.errors import FormatError, OptionError
 from mcz.model.clock import MAX_NUMBER
-
-Ints = NDArray[np.int64]
+from mcz.model.types import Ints
 
 
 def time_base_of(numbers: Ints | None, first_time: float | None) -> payloads.TimeBase | None:
-    """The time base of frames with these ascending ``numbers``, None where CLIP needs none."""
+    """The time base of frames with these ascending ``numbers``, None if CLIP needs none."""
     if numbers is None or not len(numbers):
         numbers = np.ones(1, np.int64)
     missing = missing_runs(numbers)
@@ -23,7 +21,7 @@ def time_base_of(numbers: Ints | None, first_time: float | None) -> payloads.Tim
 
 
 def missing_runs(numbers: Ints) -> list[payloads.MissingRun]:
-    """The runs of numbers that are missing between ascending ones."""
+    """The runs of missing numbers between ascending ones."""
     steps = np.diff(numbers)
     after = np.flatnonzero(steps != 1)
     runs = zip(np.diff(after, prepend=-1).tolist(), steps[after].tolist(), strict=True)
@@ -31,7 +29,7 @@ def missing_runs(numbers: Ints) -> list[payloads.MissingRun]:
 
 
 def put_time_base(fields: payloads.Clip, base: payloads.TimeBase | None) -> None:
-    """Give a CLIP this time base, or none."""
+    """Set or remove the time base of a CLIP."""
     fields.time_base = base
     fields.flags &= ~payloads.HAS_TIME_BASE
     fields.flags |= 0 if base is None else payloads.HAS_TIME_BASE
@@ -46,7 +44,9 @@ def whole_time_base(fields: payloads.Clip, cend: payloads.Cend | None) -> payloa
         raise FormatError("it is open, but states missing frames", clip=fields.name)
     timed = any(signal.role == payloads.TIMES for signal in fields.signals)
     if timed and base is not None and base.first_time is not None:  # TIME-07
-        raise FormatError("the time of its first frame beside a signal of times", clip=fields.name)
+        raise FormatError(
+            "the time of its first frame, and a signal of times too", clip=fields.name
+        )
     if late and not is_open:  # TIME-05
         raise FormatError("its CEND states missing frames, but it is not open", clip=fields.name)
     if not late:
@@ -59,7 +59,8 @@ def whole_time_base(fields: payloads.Clip, cend: payloads.Cend | None) -> payloa
 def numbers_of(base: payloads.TimeBase | None, n_frames: int, name: str, *, whole: bool) -> Ints:
     """The number of every frame; raises FormatError.
 
-    ``whole``: ``n_frames`` is what the clip was made with; else runs may lie behind what is left.
+    ``whole``: ``n_frames`` is the original number of frames; else missing runs may follow the last
+    frame.
     """
     base = base or payloads.TimeBase(number=1)
     steps = np.ones(n_frames, np.int64)
@@ -70,21 +71,21 @@ def numbers_of(base: payloads.TimeBase | None, n_frames: int, name: str, *, whol
         if frame < n_frames:
             steps[frame] += min(run.length, MAX_NUMBER)
         elif whole:  # TIME-02
-            raise FormatError(f"frames are missing behind frame {n_frames - 1}", clip=name)
+            raise FormatError(f"frames are missing after frame {n_frames - 1}", clip=name)
     if whole and last > MAX_NUMBER:  # TIME-03
         raise FormatError(f"its last frame has the number {last}", clip=name)
     return np.cumsum(steps)
 
 
-class ComingGaps:
-    """The runs of missing frames of a clip whose frames come one by one, from ``number`` on."""
+class MissingRunCounter:
+    """The missing runs of a clip whose frames come one by one, from ``number`` on."""
 
     def __init__(self, number: int) -> None:
         self.runs: list[payloads.MissingRun] = []
         self._last, self._frames, self._gap = number - 1, 0, 0  # since the run before
 
     def miss(self, count: int) -> None:
-        """Let so many frames be missing after the last one; raises OptionError before the first."""
+        """Skip so many frames after the last one; raises OptionError before the first."""
         if count < 1 or not (self._frames or self.runs):
             raise OptionError(f"{count} frames cannot be missing here")
         if self._last + self._gap + count >= MAX_NUMBER:
@@ -92,7 +93,7 @@ class ComingGaps:
         self._gap += count
 
     def frame(self) -> None:
-        """Take in the next frame."""
+        """Count the next frame."""
         if self._gap:
             self.runs.append(payloads.MissingRun(frames=self._frames, length=self._gap))
         self._frames = 1 if self._gap else self._frames + 1

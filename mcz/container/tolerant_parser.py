@@ -1,4 +1,4 @@
-"""The parser of streams of which parts are lost or damaged: what came whole, as it comes.
+"""The parser of live streams with losses: each intact part, as it arrives.
 
 SPEC.md, "Live streams with losses", is normative.
 """
@@ -13,13 +13,13 @@ from mcz.container.chunks import END_MAGIC, FOOT, REPEATED, Chunk, ChunkType, Fo
 from mcz.container.grammar import CLIP, FILE, PACKETS, ChunkEvent, Event, Fault, FootEvent
 from mcz.container.limits import BASE, MIB, check
 from mcz.container.packets import FRAME
-from mcz.container.parser import ALL, Parser, Short
+from mcz.container.parser import WHOLE, Parser, Short
 from mcz.errors import FormatError
 
-WANTED = frozenset((*REPEATED, ChunkType.CEND, ChunkType.DATA, ChunkType.REPT))
-SMALL = MIB  # what is not wanted is whole for a search up to this length
-LEAST_MOST = 256  # bytes that packets have as far as is known before one came
-PATIENCE = 4  # times as long as any before may a packet be without anything else being looked for
+PARSED_TYPES = frozenset((*REPEATED, ChunkType.CEND, ChunkType.DATA, ChunkType.REPT))
+SMALL = MIB  # other chunks of up to this length are checked whole in a search
+LEAST_MOST = 256  # bytes assumed as the largest packet before one arrived
+PATIENCE = 4  # times the largest packet: longer ones are suspect, and searched for other things
 
 _CHUNK = b"(?=" + b"|".join(sorted(kind.value for kind in ChunkType)) + b")"
 _ANY_CHUNK = re.compile(_CHUNK)
@@ -28,25 +28,25 @@ _NAME_SIZE = 4
 
 
 class TolerantParser(Parser):
-    """A parser of a stream that survives what is lost, and may begin anywhere.
+    """A parser of a stream with losses, which may begin anywhere.
 
-    A chunk may follow a packet, and a packet one that came long before. Packets that do not come
-    whole are waited for no longer than until something behind is. ``profile`` is to be set as HEAD
-    says, ``n_signals`` as CLIP does. Memory is bounded by the largest chunk.
+    A chunk may follow a packet, and a packet one that came long before. An incomplete packet is
+    waited for until a later thing is intact. ``profile`` is set from HEAD, ``n_signals`` from CLIP.
+    Memory is bounded by the largest chunk.
     """
 
     def __init__(self) -> None:
-        super().__init__(want=lambda chunk: ALL * (chunk.type in WANTED))
+        super().__init__(want=lambda chunk: WHOLE * (chunk.type in PARSED_TYPES))
         self.n_signals = 1  # of the clip
-        self._most = LEAST_MOST  # bytes of the largest packet so far
-        self._searched = 0  # what begins before was tried
-        self._short: dict[int, int] = {}  # where such packets begin and end that have not all come
-        self._suspect: int | None = None  # where a packet begins that is very long
+        self._most = LEAST_MOST  # bytes of the largest packet up to now
+        self._searched = 0  # everything that begins before was tried
+        self._short: dict[int, int] = {}  # start and end of incomplete packets
+        self._suspect: int | None = None  # start of a packet that is very long
         self._next: Event | None = None
 
     @property
     def frame_due(self) -> int | None:
-        """The number of the next frame of the open DATA, where it is known."""
+        """The number of the next frame of the open DATA, if known."""
         return self._number if self._is_told else None
 
     def next(self) -> Event | None:
@@ -85,7 +85,7 @@ class TolerantParser(Parser):
         return event
 
     def _search_next(self) -> Event | None:
-        """The next thing that is whole; a packet that was short is tried when it came."""
+        """The next intact thing; an incomplete packet is tried when it has arrived."""
         while True:
             end = self._start + len(self._data)
             pattern = _ANY_PACKET if self.state == PACKETS else _ANY_CHUNK
@@ -110,7 +110,7 @@ class TolerantParser(Parser):
                 raise Short(max(end + 1, min(self._short.values(), default=0)))
 
     def _try_at(self, at: int) -> Event | None:
-        """The thing that is whole at ``at``, or the end of a search that was given up."""
+        """The intact thing at ``at``, or the end of an exhausted search."""
         state, chunk = self.state, self._chunk
         self.at, self._tried = at, 0
         self._short.pop(at, None)
@@ -138,23 +138,23 @@ class TolerantParser(Parser):
         return event
 
     def _pass(self, chunk: Chunk) -> None:
-        """Look for what is whole in a chunk that is not, too."""
+        """Search for intact things inside a bad chunk."""
 
-    def _read_payload(self, chunk: Chunk, wanted: int) -> Event:
+    def _read_payload(self, chunk: Chunk, most_bytes: int) -> Event:
         most = self.profile.chunk_bytes
-        if wanted == ALL:
+        if most_bytes == WHOLE:
             most = min(most, max(self.profile.model_bytes, BASE.model_bytes))
         elif self._is_lost:
             most = SMALL
         check(f"chunk {chunk.label}: bytes", chunk.length or 0, most)
-        return super()._read_payload(chunk, wanted)
+        return super()._read_payload(chunk, most_bytes)
 
     def _place(self, event: ChunkEvent) -> Event:
         self.state = CLIP if self.state == PACKETS else self.state
         return super()._place(event)
 
     def _read_foot(self, at: int) -> Event:
-        """A FOOT, without the place of its index: that means nothing to who joined."""
+        """A FOOT, without the place of its index, which is useless after a late start."""
         data = self._bytes(at, at + FOOT.size)
         crc = int.from_bytes(data[4:8], "little")
         if data[24:] != END_MAGIC or crc != zlib.crc32(data[:4] + data[8:]):
@@ -163,7 +163,7 @@ class TolerantParser(Parser):
         return FootEvent(Foot(0, 0), at, None)
 
     def _may_skip(self, kind: int, count: int) -> bool:
-        # LIVE-06: of several signals it is not known whose frames the lost packets held
+        # LIVE-06: with several signals the signal of lost packets is unknown
         return kind != FRAME or count == 0 or (count > 0 and self.n_signals == 1)
 
     def _skip(self, count: int) -> None:

@@ -1,4 +1,4 @@
-"""The value hash of a signal that comes piece by piece. SPEC.md, "CEND", is normative."""
+"""The value hash of a signal, computed piece by piece. SPEC.md, "CEND", is normative."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def canonical(values: Values) -> bytes:
 
 
 def _canonical(values: Values) -> Values:
-    """The same as an array, ``values`` itself where it has these bytes."""
+    """The canonical array, ``values`` itself if it has these bytes."""
     if values.dtype == np.int64:
         return np.ascontiguousarray(values, "<i8")  # CEND-03
     if values.size and np.isnan(values.min()):  # some are
@@ -29,7 +29,7 @@ def _canonical(values: Values) -> Values:
 
 
 def value_hash(values: Values, mask: NDArray[np.bool_] | None) -> bytes:
-    """SHA-256 of the canonical array and, where any value is invalid, of the mask."""
+    """SHA-256 of the canonical array and, if any value is invalid, of the mask."""
     digest = ValueDigest()
     for start in range(0, len(values), ROWS):
         rows = slice(start, start + ROWS)
@@ -38,9 +38,9 @@ def value_hash(values: Values, mask: NDArray[np.bool_] | None) -> bytes:
 
 
 class ValueDigest:
-    """SHA-256 of the canonical array and, where any value is invalid, of the mask behind it.
+    """SHA-256 of the canonical array and, if any value is invalid, of the mask after it.
 
-    So masks are kept until the end, those of which all is valid as a number.
+    So masks are kept until the end, a mask that is all valid as a count.
     """
 
     def __init__(self) -> None:

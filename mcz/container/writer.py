@@ -1,7 +1,7 @@
-"""Writing a file front to back: nothing is ever sought, so a pipe will do.
+"""Writing a file front to back without seeking, so a pipe will do.
 
-The writer keeps the Directory of what it wrote and ends with INDX and FOOT.
-SPEC.md, "Grammar", is normative.
+The writer keeps the Directory of the written chunks and ends with INDX and FOOT. SPEC.md,
+"Grammar", is normative.
 """
 
 from __future__ import annotations
@@ -48,15 +48,15 @@ def build_head(profile: Profile) -> bytes:
     return build(payloads.Head(profile=profile.id), "HEAD")
 
 
-UNINDEXED = 8192  # bytes of a short file that is walked as fast as its index is read
+UNINDEXED = 8192  # a shorter file is walked as fast as its index is read
 
 
 class Writer:
     """Appends chunks to ``sink``; ``directory`` and ``offset`` continue an existing file.
 
-    With ``copies`` the chunks that hold everything else together stand a second time before INDX,
-    those of ``uncopied``, which the file has already, among them. ``short``: texts and skeletons
-    may refer to the words of the annex, and a file of at most ``UNINDEXED`` bytes has no INDX.
+    With ``copies``, chunks that all others depend on are stored a second time before INDX, and with
+    them the ``uncopied`` ones of the existing file. ``short``: texts and skeletons may refer to the
+    words of the annex, and a file of at most ``UNINDEXED`` bytes has no INDX.
     """
 
     def __init__(
@@ -78,7 +78,8 @@ class Writer:
         self.directory = directory or Directory()
         self._clip: ClipRow | None = None
         self._next_packet: int | None = None  # while a DATA is open
-        self._implying: tuple[SegmentRow, bytes] | None = None  # the segment whose mask frames have
+        # the segment with the mask of frames
+        self._implying: tuple[SegmentRow, bytes] | None = None
         self.last_skeleton: tuple[Skeleton, bytes] | None = None  # and its id
         self._copies = list(uncopied) if copies and not profile.is_plain else None
         if offset == 0:
@@ -151,7 +152,7 @@ class Writer:
         self.directory.attachments[name] = row
 
     def alias(self, name: str, of: int, target: bytes) -> None:
-        """Write that the file ``name`` is identical to something that this file holds."""
+        """Write that the file ``name`` is identical to a stored one."""
         self._between_clips("ALIA")
         self._new_name(name, self.directory.aliases)
         self.chunk(ChunkType.ALIA, build(payloads.Alia(name=name, of=of, target=target), "ALIA"))
@@ -193,21 +194,21 @@ class Writer:
     def frame(self, first: int, stream: bytes, *, fresh: bool) -> None:
         """Write a segment of one frame of signal 0, which has one stream, as a packet of kind 2.
 
-        A DATA is open, and in it frame ``first`` - 1 of signal 0 was written. The mask is that of
-        the last segment that was written there by ``segment``.
+        A DATA is open, and contains frame ``first`` - 1 of signal 0. The mask is the one of the
+        last segment written there by ``segment``.
         """
         clip = self._in_clip("DATA")
         if self._next_packet is None or self._implying is None:
             raise FormatError("no DATA is open with a segment of signal 0")
-        told, segment = self._implying
-        masks = told.header.flags & MASKS  # PACK-20
+        model, segment = self._implying
+        masks = model.header.flags & MASKS  # PACK-20
         header = SegmentHeader(0, first, 1, flags=fresh * FRESH | masks)
         implied = implied_by(first, mask_of(segment))
         packet = Packet(FRAME, self._next_packet, stream, fresh, implied)
-        self._packet(clip, header, packet, told if masks else None)
+        self._packet(clip, header, packet, model if masks else None)
 
     def _packet(
-        self, clip: ClipRow, header: SegmentHeader, packet: Packet, told: SegmentRow | None = None
+        self, clip: ClipRow, header: SegmentHeader, packet: Packet, model: SegmentRow | None = None
     ) -> SegmentRow:
         size = len(packet.body)
         check("packet: bytes", size, self.profile.packet_bytes)
@@ -215,7 +216,7 @@ class Writer:
         start = self.offset + len(data) - CHECK_SIZE - size
         self._write(data)
         self._next_packet = packet.sequence + 1
-        row = SegmentRow(start, size, header, packet.kind, told)
+        row = SegmentRow(start, size, header, packet.kind, model)
         clip.segments.append(row)
         return row
 
@@ -261,7 +262,7 @@ class Writer:
         self._clip = None
 
     def metadata(self, records: Sequence[Record]) -> None:
-        """Write what is said of clips that are there, or of the file, in META chunks.
+        """Write metadata of stored clips, or of the file, in META chunks.
 
         Raises MotionError in a file without a clip: no index would find them.
         """
@@ -272,10 +273,10 @@ class Writer:
             self.ancillary(ChunkType.META, payload)
 
     def begin_carried(self, row: ClipRow, payload: bytes) -> None:
-        """Write the CLIP ``payload`` of a clip whose chunks are carried over from another file.
+        """Write the CLIP ``payload`` of a clip whose chunks are copied from another file.
 
-        They are written with ``chunk`` and ``raw``, CEND among them; ``row`` learns where its CLIP
-        is, and is in the directory from ``end_carried`` on.
+        They are written with ``chunk`` and ``raw``, CEND among them; ``row`` gets the place of its
+        CLIP, and is in the directory from ``end_carried`` on.
         """
         self._between_clips("CLIP")
         self._new_name(row.name, self.directory.clips)
@@ -283,7 +284,7 @@ class Writer:
         self._clip = row
 
     def raw(self, data: bytes) -> None:
-        """Write a part of an open DATA that another file holds."""
+        """Write a part of an open DATA of another file."""
         self._in_clip("DATA")
         self._write(data)
 
@@ -293,7 +294,7 @@ class Writer:
         self._clip = None
 
     def finish(self, *, index: bool = True) -> None:
-        """Write the copies that are wanted, INDX, unless told otherwise, and FOOT."""
+        """Write the requested copies, INDX, unless disabled, and FOOT."""
         self._between_clips("FOOT")
         copies = (copy for copy in self._copies or () if is_worth_copying(copy, self.offset))
         for run in group_copies(copies):
@@ -308,7 +309,7 @@ class Writer:
         self.directory.end = self.offset
 
     def rewind(self, directory: Directory, offset: int) -> None:
-        """Forget what was written since, which the caller has kept from the sink."""
+        """Forget the chunks written since, which the caller has kept from the sink."""
         self.directory, self.offset = directory, offset
         self._clip = self._next_packet = None
         if self._copies is not None:

@@ -13,7 +13,7 @@ from mcz.exchange.conversion.scenes import WRITERS, to_scene
 from mcz.files.editing.batch_report import Outcome, Report, failure_outcome
 from mcz.files.editing.safe_names import Folder, PortableNames
 from mcz.files.editing.unpacking import safe_path
-from mcz.files.jobs import limited
+from mcz.files.jobs import limit_jobs
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open, suffixes_of
@@ -45,21 +45,20 @@ def export(
 ) -> Report:
     """Write every clip of an MCZ file below ``directory`` as another format.
 
-    ``to`` is "npz", "csv", "glb", "usda" or a format of ``mcz.convert``.
-    A clip "day1/walk" becomes "day1/walk.npz"; with an AMC comes its ASF. ``clips`` and ``where``:
-    of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them;
-    ``key_error_mm`` is that of ``to_glb``.
-    A clip that the format cannot hold, or whose file is there and not ``force``, is reported as
-    failed and the others are written. Files appear when they are whole; no link below ``directory``
-    is followed. ``jobs`` processes may work at once, by default one. Raises OptionError and what
-    ``mcz.open`` raises.
+    ``to`` is "npz", "csv", "glb", "usda" or a format of ``mcz.convert``. A clip "day1/walk" becomes
+    "day1/walk.npz"; an AMC comes with its ASF. ``clips`` and ``where`` select clips, as in
+    ``unpack``. ``rate`` and ``unit`` apply to clips that state none; ``key_error_mm`` is as in
+    ``to_glb``. A clip that the format cannot hold, or whose file exists and not ``force``, is
+    reported as failed and the others are written. Files appear when they are complete; no link
+    below ``directory`` is followed. ``jobs`` processes work in parallel, by default one. Raises
+    OptionError and as ``mcz.open``.
     """
     if to not in FORMS:
         raise OptionError(f"to {to!r}: one of {', '.join(FORMS)}")
     folder, report, written = Folder(Path(directory)), Report(), set[str]()
     portable = PortableNames()
     options: JsonObject = {"max_decoded": max_decoded, "threads": threads, "verify": True}
-    with limited(jobs), open(target, **options) as file:
+    with limit_jobs(jobs), open(target, **options) as file:
         chosen = file.chosen(clips, where)
         called = [clip.name for clip in chosen]
         with share_clips(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
@@ -79,12 +78,12 @@ def export(
     return report
 
 
-Made = tuple[str, bytes, tuple[str, ...]]  # the name of a file, its content, what is to be said
+Exported = tuple[str, bytes, tuple[str, ...]]  # name of the file, its content, remarks
 
 
 def _converted(
     shared: tuple[File, tuple[str, Fraction | float | None, str | None, float | None]], name: str
-) -> list[Made]:
+) -> list[Exported]:
     """The files that the clip ``name`` becomes."""
     file, (to, rate, unit, key_error) = shared
     clip = file.clips[name]
@@ -92,7 +91,7 @@ def _converted(
     return list(_files(clip, to, motion, key_error))
 
 
-def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Made]:
+def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Exported]:
     """The files that a clip becomes: an ASF before the AMC that needs it."""
     if to in EXPORTS:
         yield _named(clip, to), EXPORTS[to](table_of(motion)), left_out(motion, to)

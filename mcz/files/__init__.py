@@ -1,8 +1,8 @@
-"""MCZ files and archives: where model, codecs, container and sources meet.
+"""MCZ files and archives: combines model, codecs, container and sources.
 
 ``reading`` opens and verifies, ``writing`` encodes, ``editing`` cuts, packs, repairs and unpacks,
-``live`` streams frames. ``queries`` selects clips, ``tables`` gives pandas and xarray, ``bags``
-checks folders, ``jobs`` and ``dask`` share the work among processes and machines.
+``live`` streams frames. ``queries`` selects clips, ``tables`` exports to pandas and xarray,
+``bags`` checks folders, ``jobs`` and ``dask`` distribute the work to processes and machines.
 
-Imports every room named so far: ``model``, ``kinematics``, ``codecs``, ``container``, ``sources``.
+Imports these folders: ``model``, ``kinematics``, ``codecs``, ``container``, ``sources``.
 """

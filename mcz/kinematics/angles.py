@@ -23,7 +23,6 @@ FULL_TURN = {"deg": 360.0, "rad": 2 * math.pi}
 
 
 def rotation_columns(channels: Sequence[Channel]) -> Ints:
-    """The columns of rotation channels."""
     kinds = [channel.kind in ROTATION_KINDS for channel in channels]
     return np.flatnonzero(kinds).astype(np.int64)
 
@@ -39,18 +38,19 @@ def turns(steps: Floats, full: float) -> Floats:
 
 
 class Unwrapper:
-    """Takes whole turns out of the rotation channels of a signal, given block after block.
+    """Removes whole turns from the rotation channels of a signal, given block after block.
 
-    Rotation vectors and quaternions follow each other, too, by what turns as they do. Where the
-    skeleton's angle unit is unknown nothing is done to angles: a turn has no known size.
+    Rotation vectors and quaternions follow each other likewise, by the equivalents of their
+    rotations. Where the skeleton's angle unit is unknown, angles are not changed: the size of a
+    turn is unknown.
     """
 
     def __init__(self, skeleton: Skeleton, channels: Sequence[Channel] | None = None) -> None:
-        """``channels`` are those of the signal where it has its own."""
+        """``channels``: the channels of the signal if it has its own."""
         self._full = FULL_TURN.get(skeleton.angle_unit)
         self._columns = rotation_columns(skeleton.channels if channels is None else channels)
         self._last = np.zeros(len(self._columns))  # the last value that took part
-        self._begun = np.zeros(len(self._columns), np.bool_)  # whether there was one
+        self._begun = np.zeros(len(self._columns), np.bool_)  # True once a value has been seen
         self._turns = np.zeros(len(self._columns))
         joints = skeleton if channels is None else Skeleton(())
         self._followers: list[tuple[Ints, VectorFollower | SignKeeper]] = []
@@ -59,7 +59,7 @@ class Unwrapper:
         self._followers += [(c, SignKeeper()) for c in quaternions_of(joints)]
 
     def __copy__(self) -> Unwrapper:
-        """One that goes on by itself from the same row."""
+        """A copy that continues independently from the same row."""
         made = object.__new__(Unwrapper)
         made.__dict__.update(self.__dict__)
         made._followers = [(columns, copy(follow)) for columns, follow in self._followers]
@@ -79,14 +79,14 @@ class Unwrapper:
             steps = block - before
             self._last, self._begun = block[-1].copy(), np.ones_like(self._begun)
         else:
-            steps = self._steps_over_gaps(block, part)
+            steps = self._valid_steps(block, part)
         counted = np.cumsum(np.concatenate([self._turns[None], turns(steps, self._full)]), axis=0)
         self._turns = counted[-1].copy()
         out[:, self._columns] = np.where(part, block - self._full * counted[1:], block)
         return out
 
-    def _steps_over_gaps(self, block: Floats, part: Bools) -> Floats:
-        """Steps from the last value that takes part to the next, 0 where one does not."""
+    def _valid_steps(self, block: Floats, part: Bools) -> Floats:
+        """Steps from the last valid value to the next, 0 at an invalid one."""
         rows = np.where(part, np.arange(len(block))[:, None], -1)
         latest = np.maximum.accumulate(rows, axis=0)
         previous = np.concatenate([np.full_like(latest[:1], -1), latest[:-1]])
@@ -107,9 +107,9 @@ def unwrap(values: Floats, skeleton: Skeleton, channels: Sequence[Channel] | Non
 def without_turns(
     differences: Floats, skeleton: Skeleton, channels: Sequence[Channel] | None = None
 ) -> Floats:
-    """Differences of two signals, (n_rows, n_channels), those of rotations less their whole turns.
+    """Differences of two signals, (n_rows, n_channels), of rotations without whole turns.
 
-    A new array; a difference of ``BEYOND`` or more is left as it is.
+    A new array; a difference of ``BEYOND`` or more is not changed.
     """
     out = np.array(differences, dtype=np.float64)
     full = FULL_TURN.get(skeleton.angle_unit)
@@ -121,7 +121,7 @@ def without_turns(
     return out
 
 
-BEYOND = 2.0**40  # a number of this magnitude or more takes no part
+BEYOND = 2.0**40  # numbers of this magnitude or more are ignored
 
 
 def vectors_of(skeleton: Skeleton) -> list[Ints]:
@@ -136,29 +136,29 @@ def quaternions_of(skeleton: Skeleton) -> list[Ints]:
 
 def _columns(skeleton: Skeleton, kinds: tuple[str, ...]) -> list[Ints]:
     starts = skeleton.column_starts()
-    found = (
+    columns = (
         first_columns(joint.channels, kinds, start)
         for joint, start in zip(skeleton.joints, starts, strict=False)
     )
-    return [np.array(columns, np.int64) for columns in found if columns]
+    return [np.array(columns, np.int64) for columns in columns if columns]
 
 
 class VectorFollower:
-    """Makes one rotation vector follow itself, block after block of rows."""
+    """Makes one rotation vector continuous, block after block of rows."""
 
     def __init__(self, full: float) -> None:
         self._full = full
         self._last: Floats | None = None
 
     def __call__(self, vectors: Floats) -> Floats:
-        """The next rows, (n_rows, 3), each the nearest to the one before of those alike."""
+        """The next rows, (n_rows, 3), each the equivalent vector nearest to the row before."""
         rows = np.flatnonzero((np.abs(vectors) < BEYOND).all(axis=1))
         if not len(rows):
             return vectors
         own = vectors[rows]
         last = own[:1] if self._last is None else self._last[None]
         counts = _turns(own, np.concatenate([last, own[:-1]]), self._full)[0]
-        if counts.any():  # rare: the rest goes row by row, for each depends on the one before
+        if counts.any():  # rare: each row depends on the one before
             first = int(np.flatnonzero(counts)[0])
             before = own[first - 1] if first else last[0]
             for row in range(first, len(own)):
@@ -190,37 +190,37 @@ class SignKeeper:
         return out
 
 
-def nearest(vectors: Floats, wanted: Floats, full: float) -> Floats:
+def nearest(vectors: Floats, target: Floats, full: float) -> Floats:
     """Return the equivalent rotation vectors, (n, 3), nearest to ``wanted``."""
-    counts, axes = _turns(vectors, wanted, full)
+    counts, axes = _turns(vectors, target, full)
     return np.where(counts[:, None] == 0, vectors, vectors + (full * counts)[:, None] * axes)
 
 
-def _turns(vectors: Floats, wanted: Floats, full: float) -> tuple[Floats, Floats]:
+def _turns(vectors: Floats, target: Floats, full: float) -> tuple[Floats, Floats]:
     """Whole turns from each vector to the nearest equivalent one, and their axes."""
     sizes = np.sqrt((vectors * vectors).sum(axis=1))
-    others = np.sqrt((wanted * wanted).sum(axis=1))
-    zero = sizes == 0  # any axis is as good: that of what is wanted
+    others = np.sqrt((target * target).sum(axis=1))
+    zero = sizes == 0  # any axis is as good: the target's
     lengths = np.where(zero, others, sizes)
-    axes = np.where(zero[:, None], wanted, vectors) / np.where(lengths == 0, 1.0, lengths)[:, None]
-    counts = np.rint(((wanted * axes).sum(axis=1) - sizes) / full)
+    axes = np.where(zero[:, None], target, vectors) / np.where(lengths == 0, 1.0, lengths)[:, None]
+    counts = np.rint(((target * axes).sum(axis=1) - sizes) / full)
     return counts, axes
 
 
 def without_whole_turns(
     original: Floats, decoded: Floats, differences: Floats, skeleton: Skeleton
 ) -> Floats:
-    """``differences``, decoded minus original, those of vectors and quaternions the least alike.
+    """Make ``differences`` of vectors and quaternions, decoded minus original, the least ones.
 
-    All are (n_rows, n_channels); ``differences`` is written to and returned. Nothing is changed
-    where a number is not below 2^40 in magnitude.
+    All are (n_rows, n_channels); ``differences`` is written to and returned. A number of 2^40 or
+    more in magnitude is not changed.
     """
     full = {"deg": 360.0, "rad": 2 * math.pi}.get(skeleton.angle_unit, 0.0)
     for columns in vectors_of(skeleton) if full else []:
         rows = _known(original, decoded, columns)
-        wanted = original[np.ix_(rows, columns)]
+        target = original[np.ix_(rows, columns)]
         differences[np.ix_(rows, columns)] = (
-            nearest(decoded[np.ix_(rows, columns)], wanted, full) - wanted
+            nearest(decoded[np.ix_(rows, columns)], target, full) - target
         )
     for columns in quaternions_of(skeleton):
         rows = _known(original, decoded, columns)

@@ -1,8 +1,8 @@
 """The chain of joints: channel values -> origin and local axes of every joint.
 
-SPEC.md, "Kinematics", is normative. For each joint B = W C, whose columns are the joint's local
-axes in the world (W: its rotation in the world, C: the matrix of its ``axis``), is all that is
-kept: from parent to child it takes one constant matrix, C_parent^-1 C, and then one mixing of two
+SPEC.md, "Kinematics", is normative. For each joint only B = W C is stored, whose columns are the
+joint's local axes in the world (W: its rotation in the world, C: the matrix of its ``axis``). A
+step from parent to child takes one constant matrix, C_parent^-1 C, and then one mixing of two
 columns a rotation channel.
 """
 
@@ -44,12 +44,12 @@ LEAST_FRAMES = 16
 class Link:
     """A joint as the chain needs it; vectors are along its own local axes unless noted.
 
-    ``change``: C_parent^-1 C, shape (3, 3, 1), None where that is the identity. ``offset``: from
-    the parent's origin, (3,), along the parent's W. ``parent_back``: C_parent^-1, or None.
-    ``moves`` and ``scales``: (component, column); ``turns``: (axis, column) in the order of
-    multiplication from the right; axis QUATERNION is that of the columns ``quaternion``, axis
-    VECTOR that of the columns ``vector``, each with the first of its columns.
-    ``direction``: of the first tail, None where it has no length.
+    ``change``: C_parent^-1 C, shape (3, 3, 1), None where it is the identity. ``offset``: from the
+    parent's origin, (3,), along the parent's W. ``parent_back``: C_parent^-1, or None. ``moves``
+    and ``scales``: (component, column); ``turns``: (axis, column) in the order of multiplication
+    from the right; the axis QUATERNION stands for the columns ``quaternion``, VECTOR for the
+    columns ``vector``, each with the first of its columns. ``direction``: of the first tail, None
+    where it has no length.
     """
 
     parent: int
@@ -73,7 +73,7 @@ class Link:
 
     @property
     def turning(self) -> list[int]:
-        """The columns of all that turns, in the order of ``turns``."""
+        """The columns of all turning channels, in the order of ``turns``."""
         return [each for turn in self.turns for each in self.parts(*turn)]
 
     @property
@@ -97,10 +97,10 @@ class Link:
 class Pose:
     """Joint transforms of a block of F frames.
 
-    Of each joint ``origins`` has its position, (3, F) or (3, 1) where that is constant; ``axes``
-    its local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
-    along the parent's local axes before the parent's scale, (3, F) or (3, 1); ``spins`` what each
-    of its columns ``turning`` turns about in the world, (3, F) or (3, 1), for a unit of a
+    Of each joint ``origins`` has its position, (3, F) or (3, 1) where it is constant; ``axes`` its
+    local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
+    along the parent's local axes before the parent's scale, (3, F) or (3, 1); ``spins`` the
+    rotation axis in the world of each of its columns ``turning``, (3, F) or (3, 1), for a unit of a
     quaternion's part, or a radian of any other.
     """
 
@@ -113,8 +113,8 @@ class Pose:
 class Chain:
     """The kinematics of a skeleton, prepared once for all frames.
 
-    Raises MotionError where the skeleton has rotations and its angle unit is unknown, and where
-    it has channels, but none that places a joint.
+    Raises MotionError where the skeleton has rotations and its angle unit is unknown, and where it
+    has channels, but none of them moves a joint.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -189,7 +189,7 @@ class Chain:
                 yield rows, columns, self.pose(columns)
 
     def pose(self, columns: Floats) -> Pose:
-        """The pose of frames whose values are ``columns``, shape (n_channels, F)."""
+        """The pose of frames with the values ``columns``, shape (n_channels, F)."""
         pose = Pose([], [], [], [])
         for link in self.links:
             self.add(pose, link, self.place_joint(pose, link, columns), columns)
@@ -272,9 +272,9 @@ class Chain:
 
     @staticmethod
     def _quaternion(axes: Floats, parts: Floats, spins: list[Floats]) -> Floats:
-        """``axes`` turned by quaternions, (4, F), of any length but 0.
+        """Turn ``axes`` by quaternions, (4, F), of any length but 0.
 
-        Adds what a change of each part turns about, in the world, to ``spins``.
+        Adds the rotation axes in the world of a change of each part to ``spins``.
         """
         square = (parts * parts).sum(axis=0)
         w, x, y, z = parts
@@ -289,7 +289,7 @@ IDENTITY: Floats = np.eye(3)[:, :, None]
 
 
 class SkeletonKey:
-    """A skeleton as a key: the very same object, for comparing thousands of joints takes long."""
+    """A skeleton as a key by identity, since comparing thousands of joints takes long."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
@@ -302,7 +302,7 @@ class SkeletonKey:
 
 
 def chain_of(skeleton: Skeleton) -> Chain:
-    """``Chain(skeleton)``, prepared once where it is asked for block after block."""
+    """``Chain(skeleton)``, prepared once for repeated calls."""
     return _chain_of(SkeletonKey(skeleton))
 
 

@@ -1,8 +1,7 @@
-"""Contacts: in which frames a foot stands. docs/guides/contacts.md, is normative.
+"""Contacts: in which frames a foot stands. docs/guides/contacts.md is normative.
 
-A foot stands where its point is slow and near the lowest that it gets. Two thresholds each keep
-the answer from flickering: what is below the wider ones belongs to a contact if somewhere in it
-both are below the narrower ones.
+A foot stands where its point is slow and near its lowest height. Two thresholds each avoid flicker:
+a run below the wider ones is a contact if both are below the narrower ones somewhere in it.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from mcz.model.skeleton import column_of, signs_of
 from mcz.model.text_format import brief, counted
 from mcz.model.types import Bools, Floats
 
-USUAL_RATE = 120.0  # frames a second where nobody says: that of CMU's AMC files
+USUAL_RATE = 120.0  # assumed frames a second: the rate of CMU's AMC files
 AXES = "xyz"
 BLOCK = 2**19  # numbers that are worked on at a time
 
@@ -30,9 +29,9 @@ BLOCK = 2**19  # numbers that are worked on at a time
 class ContactRule:
     """Thresholds of a contact: speeds in cm/s, heights in cm, times in seconds.
 
-    ``speed`` is that over ``window``; ``height`` is above the percentile ``floor`` of all heights
-    of that point. A contact goes on below ``wide_speed`` and ``wide_height``. Interruptions of up
-    to ``gap`` are closed, and what is then shorter than ``least`` is none.
+    ``speed`` is averaged over ``window``; ``height`` is above the percentile ``floor`` of all
+    heights of that point. A contact lasts while below ``wide_speed`` and ``wide_height``. Pauses of
+    up to ``pause`` are closed; then contacts shorter than ``least`` are dropped.
     """
 
     speed: float = 15.0
@@ -61,9 +60,9 @@ class Contact:
 class Contacts:
     """All contacts of a motion, joint by joint in the order of the skeleton, each in time order.
 
-    ``joints`` are those that were looked at, as ``Skeleton.addresses`` names them. ``up_axis`` is
-    "x" to "-z", and ``up_guessed`` where the skeleton does not say it; ``rate_assumed`` where
-    ``frame_rate`` is 120 because nobody says it. Raises MotionError where a run is of another
+    ``joints`` are the examined joints, as ``Skeleton.addresses`` names them. ``up_axis`` is "x" to
+    "-z", and ``up_guessed`` where the skeleton does not state it; ``rate_assumed`` where
+    ``frame_rate`` is 120 because no rate is known. Raises MotionError where a run is of another
     joint or beyond the frames.
     """
 
@@ -86,11 +85,11 @@ class Contacts:
     def frames(self, joint: str) -> Bools:
         """Contact state of ``joint`` in every frame, bool (n_frames,).
 
-        Raises MotionError where that joint was not looked at.
+        Raises MotionError where that joint was not examined.
         """
         if joint not in self.joints:
             known = ", ".join(self.joints)
-            raise MotionError(f"joint {joint!r} is none of those looked at: {known}")
+            raise MotionError(f"joint {joint!r} is not one of the feet examined: {known}")
         standing = np.zeros(self.n_frames, np.bool_)
         for run in self.runs:
             if run.joint == joint:
@@ -101,19 +100,21 @@ class Contacts:
 def contacts(
     motion: Motion, joints: Sequence[int | str] | None = None, rule: ContactRule = RULE
 ) -> Contacts:
-    """In which frames of ``motion`` a foot stands; docs/guides/contacts.md, has the rule.
+    """In which frames of ``motion`` a foot stands; docs/guides/contacts.md has the rule.
 
-    ``joints`` are the feet, by index or name; None takes those whose names say so, ``LeftFoot``,
-    ``ltoes`` and the like. What stands is the first point of the joint. An axis that points up and
-    a frame rate that nobody says are guessed, and the result says so. Where a position is unknown,
-    nothing stands. Where frames are missing, each part between two gaps is looked at by itself.
+    ``joints`` are the feet, by index or name; None takes feet by their names, ``LeftFoot``,
+    ``ltoes`` and the like. The first point of a joint decides. An up axis or a frame rate that is
+    unknown is guessed, and marked in the result. Where a position is unknown, there is no contact.
+    Each part between two breaks in time is examined separately.
 
     Raises MotionError where there is no such joint, no foot by name or no kinematics, and
     OptionError where the length unit is unknown.
     """
     skeleton, signal = motion.skeleton, motion.signals[0]
     if not signal.has_poses:
-        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
+        raise MotionError(
+            "the channels of its motion signal differ from those of its skeleton", clip=motion.name
+        )
     tracks = FootTracks(skeleton, joints, motion.n_frames)
     step = max(1, BLOCK // max(1, skeleton.n_channels + 12 * skeleton.n_joints))
     for start in range(0, motion.n_frames, step):
@@ -128,8 +129,8 @@ def contacts(
 class FootTracks:
     """Foot positions in every frame, collected from blocks of point positions.
 
-    ``joints`` as of ``contacts``, whose errors it raises. ``feet`` is float64 (n_feet, n_frames,
-    3), ``body`` the mean of all known points, float64 (n_frames, 3), both in length units.
+    ``joints`` and errors as in ``contacts``. ``feet`` is float64 (n_feet, n_frames, 3), ``body``
+    the mean of all known points, float64 (n_frames, 3), both in length units.
     """
 
     def __init__(
@@ -156,7 +157,7 @@ class FootTracks:
         self.body = np.full((n_frames, 3), np.nan)
 
     def add(self, start: int, points: Floats) -> None:
-        """Take positions of all points, (frames, n_points, 3), from frame ``start`` on."""
+        """Add positions of all points, (frames, n_points, 3), from frame ``start`` on."""
         frames = slice(start, start + len(points))
         self.body[frames] = _means(points)
         for foot, point in enumerate(self._points):
@@ -171,12 +172,12 @@ class FootTracks:
     ) -> Contacts:
         """The contacts; ``rate`` in frames a second, None and "" are unknown.
 
-        ``runs`` are the frames a <= f < b between gaps, None: all.
+        ``runs`` are the frames a <= f < b between breaks in time, None: all.
         """
         up = up_axis or self.guess_up_axis()
         frame_rate = rate or USUAL_RATE
         parts = runs or [(0, self.feet.shape[1])]
-        with np.errstate(over="ignore"):  # what overflows is unknown
+        with np.errstate(over="ignore"):  # overflow is unknown
             places = self.feet * (self.unit_cm * signs_of(up))
         return Contacts(
             runs=tuple(
@@ -206,10 +207,10 @@ class FootTracks:
 
 
 def _means(points: Floats) -> Floats:
-    """The mean over the points of a frame that are known, NaN where none is, (frames, 3)."""
+    """The mean over the known points of a frame, NaN without any, (frames, 3)."""
     with np.errstate(all="ignore"):
         means: Floats = points.sum(axis=1) / points.shape[1]
-        if not np.isfinite(means).all():  # a search for what is unknown takes longer
+        if not np.isfinite(means).all():  # the search for unknown points is slower
             known: Bools = np.asarray(np.isfinite(points).all(axis=2))
             sums = np.where(known[..., None], points, 0.0).sum(axis=1)
             means = sums / known.sum(axis=1)[:, None]
@@ -228,13 +229,13 @@ def find_runs(
     """First frame and number of frames of every contact of one point.
 
     ``track`` has its positions in cm, float64 (n_frames, 3), NaN where unknown; ``up`` is the
-    column of the up axis, ``rate`` in frames a second, ``floor`` a ``lowest_height``; None: that of
-    this track.
+    column of the up axis, ``rate`` in frames a second, ``floor`` a ``lowest_height``; None: the one
+    of this track.
     """
     known: Bools = np.asarray(np.isfinite(track).all(axis=1))
     if not known.any():
         return
-    with np.errstate(all="ignore"):  # what overflows does not stand
+    with np.errstate(all="ignore"):  # overflow is no contact
         speed = speeds(track, rate, rule.window)
         lowest = np.percentile(track[known, up], rule.floor) if floor is None else floor
         height = track[:, up] - lowest
@@ -246,9 +247,9 @@ def find_runs(
 
 
 def speeds(track: Floats, rate: float, window: float) -> Floats:
-    """The speed of a point, from its places half a ``window`` before and after, in units/s.
+    """The speed of a point, from its positions half a ``window`` before and after, in units/s.
 
-    ``track`` is (n_frames, 3); the result (n_frames,), NaN where one of the places is unknown.
+    ``track`` is (n_frames, 3); the result (n_frames,), NaN where one of the positions is unknown.
     """
     half = min(max(1, frames_in(window / 2, rate)), len(track))
     frames = np.arange(len(track))
@@ -259,19 +260,19 @@ def speeds(track: Floats, rate: float, window: float) -> Floats:
 
 
 def frames_in(seconds: float, rate: float) -> int:
-    """The nearest whole number of frames, of two the greater."""
+    """The nearest whole number of frames; ties: the greater."""
     return int(np.floor(seconds * rate + 0.5))
 
 
-def _join_runs(flags: Bools, known: Bools, gap: int) -> Iterator[tuple[int, int]]:
-    """First frame and end of every run of ``flags``, runs with up to ``gap`` between them joined.
+def _join_runs(flags: Bools, known: Bools, pause: int) -> Iterator[tuple[int, int]]:
+    """First frame and end of every run of ``flags``, joined over pauses of up to ``pause`` frames.
 
-    What is between them must be ``known``.
+    All frames of a pause must be ``known``.
     """
     edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).tolist()
     runs: list[tuple[int, int]] = []
     for first, stop in zip(edges[::2], edges[1::2], strict=True):
-        if runs and first - runs[-1][1] <= gap and known[runs[-1][1] : first].all():
+        if runs and first - runs[-1][1] <= pause and known[runs[-1][1] : first].all():
             runs[-1] = runs[-1][0], stop
         else:
             runs.append((first, stop))

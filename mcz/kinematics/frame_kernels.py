@@ -1,6 +1,6 @@
 """Compiled: the poses of frames, one after the other, of skeletons that only turn and move.
 
-The steps are those of ``chain.py``, which knows every kind of channel. Imported on first use only.
+``chain.py`` has the same steps for every kind of channel. Imported on first use only.
 """
 
 from __future__ import annotations
@@ -56,18 +56,18 @@ def position_points(
 
 @kernel
 def place_frames(
-    values: Floats2, joints: Joints, wanted: Ints, points: Points, out: Floats3, kept: Floats4
+    values: Floats2, joints: Joints, indices: Ints, points: Points, out: Floats3, kept: Floats4
 ) -> None:
     """Write ``points`` of all frames to ``out`` (n_frames, n_points, 3), and axes to ``kept``.
 
-    ``values`` (n_frames, n_channels); ``wanted`` are the joints to place, parents before children.
-    ``kept`` (n_frames, n_joints, 3, 3), or (0, ...) where the axes are of no use.
+    ``values`` (n_frames, n_channels); ``indices`` are the joints to place, parents before children.
+    ``kept`` (n_frames, n_joints, 3, 3), or (0, ...) where the axes are not needed.
     """
     n_joints = len(joints.parents)
     arm, origins, axes = np.empty(3), np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
     for frame in range(len(values)):
-        for number in range(len(wanted)):
-            _place(values[frame], joints, wanted[number], arm, origins, axes)
+        for number in range(len(indices)):
+            _place(values[frame], joints, indices[number], arm, origins, axes)
         _mark(points, origins, axes, out[frame])
         if len(kept):
             for joint in range(n_joints):
@@ -77,15 +77,15 @@ def place_frames(
 
 
 @kernel
-def turn_frames(values: Floats2, joints: Joints, wanted: Ints, out: Floats4) -> None:
-    """Write the local rotations of the joints ``wanted``, (n_frames, n_wanted, 3, 3).
+def turn_frames(values: Floats2, joints: Joints, indices: Ints, out: Floats4) -> None:
+    """Write the local rotations of the joints ``indices``, (n_frames, n_indices, 3, 3).
 
-    These are C M C^-1, M the product of the joint's own turns: the identity in the rest pose.
+    They are C M C^-1, M the product of the joint's own turns: the identity in the rest pose.
     """
     own = np.empty((3, 3))
     for frame in range(len(values)):
-        for number in range(len(wanted)):
-            joint = wanted[number]
+        for number in range(len(indices)):
+            joint = indices[number]
             for i in range(3):
                 for j in range(3):
                     own[i, j] = joints.owns[joint, i, j]

@@ -1,6 +1,6 @@
 """Point positions and joint rotations: ``FramePoses`` of many frames, ``FramePositions`` of one.
 
-Compiled where the skeleton only turns and moves, from ``Chain`` otherwise: the same to 1e-9.
+Compiled where the skeleton only turns and moves, from ``Chain`` otherwise: equal to 1e-9.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ from mcz.model.types import Floats
 class FramePoses:
     """The poses of a skeleton. Joints and points are given by index, values in source units.
 
-    Values are (n_frames, n_channels); of joints that neither are wanted nor above wanted ones they
-    are not looked at. What depends on an invalid value is NaN. Raises as ``Chain`` does.
+    Values are (n_frames, n_channels); channels of joints that are neither requested nor above a
+    requested one are ignored. A result that depends on an invalid value is NaN. Raises as
+    ``Chain``.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -58,7 +59,7 @@ class FramePoses:
         return [self._points[point][0] for point in points]
 
     def tails(self) -> Floats:
-        """From each point's joint to it in the rest pose, in the world's axes, (n_points, 3)."""
+        """From each point's joint to the point at rest, in the world's axes, (n_points, 3)."""
         tails = self._tails.copy()
         for point, (joint, _) in enumerate(self._points):
             own = self.chain.turned[joint]
@@ -136,8 +137,8 @@ class FramePoses:
         self, values: Floats, joints: Sequence[int], points: Points, out: Floats, kept: Floats
     ) -> None:
         assert self._tables is not None
-        wanted = np.array(self.above(joints), np.int64)
-        place_frames(_rows(values), self._tables[0], wanted, points, out, kept)
+        indices = np.array(self.above(joints), np.int64)
+        place_frames(_rows(values), self._tables[0], indices, points, out, kept)
 
 
 def _rows(values: Floats) -> Floats:
@@ -145,7 +146,7 @@ def _rows(values: Floats) -> Floats:
 
 
 def frame_poses_of(skeleton: Skeleton) -> FramePoses:
-    """``FramePoses(skeleton)``, prepared once for a skeleton that is asked for again and again."""
+    """``FramePoses(skeleton)``, prepared once for repeated calls."""
     return _frame_poses_of(SkeletonKey(skeleton))
 
 
@@ -158,7 +159,8 @@ class FramePositions:
     """Positions of the points of ``skeleton`` and, on request, its virtual markers.
 
     Maps the channels of a frame, (n_channels,), to (n_places, 3) in length units, NaN where
-    unknown: the same as ``positions_of`` and ``virtual_markers_of`` to 1e-9. Raises as they do.
+    unknown. Results equal ``positions_of`` and ``virtual_markers_of`` to 1e-9, with the same
+    errors.
     """
 
     def __init__(self, skeleton: Skeleton, *, virtual_markers: bool = False) -> None:
@@ -200,7 +202,7 @@ class FramePositions:
 
 
 def is_elaborate(chain: Chain) -> bool:
-    """Return True if a joint has other channels than rotations and positions, or a repeated one."""
+    """Return True if a joint has channels other than rotations and positions, or a repeated one."""
     return any(
         link.is_whole
         or link.scales

@@ -1,8 +1,8 @@
-"""A first guess of inverse kinematics: joint after joint from the roots down, all frames at once.
+"""A first guess of inverse kinematics: joint after joint from the roots down, all frames together.
 
-Each joint turns so that what is fastened to it points where it was seen, as well as its own
-channels can: by the rotation nearest to rest among the best (Kabsch's), or, where it has not all
-three freedoms, angle by angle, for the best of one angle is known in closed form.
+Each joint turns so that its targets point in the given directions, as nearly as its own channels
+allow: by the rotation nearest to rest among the best (Kabsch's), or, where it lacks one of the
+three freedoms, angle by angle, since the best of one angle is known in closed form.
 """
 
 from __future__ import annotations
@@ -16,18 +16,20 @@ from mcz.kinematics.rotation_fit import set_turns
 from mcz.kinematics.targets import Targets
 from mcz.model.types import Floats
 
-FARTHER = 0.01  # the weight of what hangs on the next turning joint, where that is asked at all
-LINE = 1e-3  # second singular value, of the first: below it all lie on one line, the roll is open
-FAR_LINE = 0.3  # the same where other joints may have bent what hangs there
-TO_REST = 1e-6  # the weight of staying at rest, for what nothing else decides
-LINE_TO_REST = 1e-2  # the same for what lies on a line
+FARTHER = 0.01  # the weight of targets below the next turning joint, if they count at all
+# ratio of the second singular value to the first: below it targets lie on one line, the roll is
+# open
+LINE = 1e-3
+FAR_LINE = 0.3  # the same where other joints may have bent the targets
+TO_REST = 1e-6  # keeps channels that no target determines at rest
+LINE_TO_REST = 1e-2  # the same for targets on a line
 
 
 @dataclass(frozen=True, slots=True)
 class AttachedTargets:
     """Targets attached to a joint: numbers, weights, positions along its axes (n, 3).
 
-    ``origin`` is the target at the joint's own origin, -1 where there is none.
+    ``origin`` is the target at the joint's own origin, -1 if there is none.
     """
 
     numbers: list[int]
@@ -38,7 +40,7 @@ class AttachedTargets:
 
 
 class InitialPose:
-    """Prepared once for a skeleton; ``columns`` gives values for a block of frames."""
+    """The guess for a skeleton, prepared once; ``columns`` returns values for a block of frames."""
 
     def __init__(self, targets: Targets) -> None:
         self.targets, self.chain = targets, targets.chain
@@ -75,9 +77,9 @@ class InitialPose:
     ) -> tuple[list[int], bool]:
         """The targets to turn by, and whether they spread to two sides.
 
-        Those that nothing bends, where they do not all lie at the joint's origin. A root whose own
-        are on one line is turned about it by the nearest that are not, for it may face anywhere;
-        any other joint stays as near to rest as it can.
+        Targets that no other joint bends, unless they all lie at the joint's origin. A root whose
+        own targets are on one line is turned about it by the nearest ones that are not, for it may
+        face anywhere; any other joint stays as near to rest as possible.
         """
         nearest: list[int] = []
         for step in range(max(steps.values(), default=-1) + 1):
@@ -123,7 +125,7 @@ class InitialPose:
     def columns(self, seen: Floats, known: Floats) -> Floats:
         """Values (n_channels, F) for positions seen, (n_targets, 3, F), where ``known`` is 1.
 
-        A joint of which nothing is known holds the angles of the frame before.
+        A joint without a known target keeps the angles of the frame before.
         """
         columns = self.targets.neutral(seen.shape[2])
         pose = Pose([], [], [], [])
@@ -167,7 +169,7 @@ class InitialPose:
         if body.origin >= 0:
             own = known[body.origin] > 0
             base = np.where(own, seen[body.origin], origin)
-        elif link.moves:  # wherever it is
+        elif link.moves:  # at any position
             total = np.maximum(weights.sum(axis=0), 1e-300)
             a = a - (weights[:, None] * a).sum(axis=0) / total
             base = (weights[:, None] * b).sum(axis=0) / total
@@ -212,17 +214,17 @@ class InitialPose:
         for component, column in link.moves:
             if component not in done:
                 columns[column] = np.where(there, step[component], 0.0)
-                _interpolate_gaps(columns[column], there)
+                _interpolate_unknown(columns[column], there)
             done.add(component)
         return self.chain.place_joint(pose, link, columns)
 
 
 def _fill_gaps(link: Link, known: Floats, columns: Floats) -> None:
     for column in link.turning:
-        _interpolate_gaps(columns[column], known)
+        _interpolate_unknown(columns[column], known)
 
 
-def _interpolate_gaps(track: Floats, known: Floats) -> None:
+def _interpolate_unknown(track: Floats, known: Floats) -> None:
     """Interpolate linearly in time the frames that are not ``known``."""
     rows = np.flatnonzero(known)
     if 0 < len(rows) < len(track):

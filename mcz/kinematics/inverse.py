@@ -1,11 +1,15 @@
-"""Inverse kinematics: values whose points, and virtual markers, lie where they were seen.
+"""Inverse kinematics: values whose points, and virtual markers, reach the given positions.
 
-There is no exact answer: the solution has the least sum of squared distances and, among equals,
-the values nearest to rest and to the neighbor frames. All frames are solved at once: an initial
-pose from the roots down (``initial_pose.py``), damped Gauss-Newton steps (Levenberg, Marquardt), a
-restart for frames that end far off or stand out, and, where distances remain, a last pass that
-smooths values that those hardly determine. The cost per frame is constant; large arrays are held
-for a block of frames only. mcz/kinematics/README.md has the choices.
+There is no exact answer: the solution has the least sum of squared distances and, among equals, the
+values nearest to rest and to the neighbor frames. All frames are solved together:
+
+1. an initial pose from the roots down (``initial_pose.py``),
+2. damped Gauss-Newton steps (Levenberg, Marquardt),
+3. a restart of frames that end far off or stand out,
+4. where distances remain, smoothing of values that the positions hardly determine.
+
+The cost per frame is constant; large arrays exist for a block of frames only.
+mcz/kinematics/README.md explains the choices.
 """
 
 from __future__ import annotations
@@ -22,27 +26,30 @@ from mcz.kinematics.targets import Targets
 from mcz.model.motion import Skeleton
 from mcz.model.types import Bools, Floats, Ints
 
-MOST_STEPS, MENDING_STEPS, STEADY_STEPS = 50, 20, 10
-TO_GUESS = 1e-6  # the weight of staying near the guess, for what nothing else decides
-TRIES, FAR_OFF, BESIDE = 2, 0.1, 1.0  # times, typical levers (rms), radians (rms)
-GUESSED = 2**12  # frames at a time
-JUMP = 0.35  # radians from a frame to the next, more than what people do
-SHORT = 8  # frames between two jumps, whatever lies beside them
-BAD = 5.0  # times the usual distance: a frame that did not get there
-FEW = 0.3  # of all frames
-SAME, NOTHING = 1e-2, 1e-10  # of a sum of squares, of typical levers: no difference
-EXACT = 1e-5  # of the typical lever: distances that leave nothing to steady
-STEADY = 0.05  # radians: how far angles stray from their mean over the frames around
-AROUND = (8, 4)  # frames to each side, from coarse to fine
-LOOSER = 1.5  # excess error of a smoothed solution, in units of noise times free channels
+MOST_STEPS, REPAIR_STEPS, SMOOTHING_STEPS = 50, 20, 10
+GUESS_WEIGHT = 1e-6  # keeps channels that no target determines near the guess
+RESTARTS = 2
+FAR_OFF = 0.1  # typical levers (rms): frames with a greater error are restarted
+RESTART_NOISE = 1.0  # radians (rms)
+GUESS_BLOCK = 2**12  # frames
+JUMP = 0.35  # radians from a frame to the next, more than people turn
+SHORT_RUN = 8  # frames: runs between two jumps that are always outliers
+OUTLIER_RATIO = 5.0  # times the median error
+MOST_OUTLIERS = 0.3  # of all frames
+EQUAL_ERRORS = 1e-2  # relative difference of sums of squares that counts as none
+NEGLIGIBLE_SQUARE = 1e-10  # of the sum where every target is a typical lever away
+EXACT_FIT = 1e-5  # typical levers: smaller distances need no smoothing
+ANGLE_SPREAD = 0.05  # radians: usual deviation of angles from their mean over WINDOWS
+WINDOWS = (8, 4)  # frames to each side, from coarse to fine
+MOST_EXCESS = 1.5  # excess error of a smoothed solution, in units of noise times free channels
 
 
 def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) -> Floats:
     """Values (n_frames, n_channels) in source units that bring points to these positions.
 
-    ``points`` are the positions of its points, (n_frames, n_points, 3) in its length unit, as
-    ``positions_of`` gives them, ``markers`` those of its virtual markers if they are known. NaN
-    is a position that is not known. Plain scalars, and what else moves nothing, are 0.
+    ``points`` are the positions of the points of ``skeleton``, (n_frames, n_points, 3) in its
+    length unit, as ``positions_of`` returns them, ``markers`` those of its virtual markers if
+    known. NaN is an unknown position. Channels that move no target are 0.
 
     Raises MotionError where the shapes do not match the skeleton, and where it has no kinematics;
     OptionError for virtual markers without a length unit.
@@ -55,7 +62,7 @@ def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) 
 
 
 class _Solution:
-    """Values on their way from the guess to the best, (n_channels, F)."""
+    """The state of the solver: values (n_channels, F) and their errors (F,)."""
 
     def __init__(self, targets: Targets, seen: Floats, known: Floats) -> None:
         self.targets, self.seen, self.known = targets, seen, known
@@ -66,8 +73,8 @@ class _Solution:
         self.errors = np.zeros(seen.shape[2])
 
     def values(self) -> Floats:
-        """All steps; values (n_frames, n_channels)."""
-        weight = np.full((len(self.columns), 1), TO_GUESS)
+        """Run all steps; returns values (n_frames, n_channels)."""
+        weight = np.full((len(self.columns), 1), GUESS_WEIGHT)
         self._accept(self._refine(self.columns, self.columns, weight, MOST_STEPS), None)
         self._retry(weight)
         self._make_continuous()
@@ -80,7 +87,7 @@ class _Solution:
 
     def _initial_columns(self) -> Floats:
         guess, n_frames = InitialPose(self.targets), self.seen.shape[2]
-        parts = [slice(start, start + GUESSED) for start in range(0, n_frames, GUESSED)]
+        parts = [slice(start, start + GUESS_BLOCK) for start in range(0, n_frames, GUESS_BLOCK)]
         return np.concatenate(
             [guess.columns(self.seen[:, :, rows], self.known[:, rows]) for rows in parts], axis=1
         )
@@ -103,16 +110,16 @@ class _Solution:
         self.errors[frames] = np.where(accepted, errors, self.errors[frames])
 
     def _retry(self, weight: Floats) -> None:
-        """Frames that ended far off start again from angles beside those where they ended."""
+        """Restart frames that ended far off from nearby random angles."""
         random = np.random.default_rng(0)
-        for _ in range(TRIES):
-            frames = np.flatnonzero(self.errors > FAR_OFF**2 * self._unit_error())
+        for _ in range(RESTARTS):
+            frames = np.flatnonzero(self.errors > FAR_OFF**2 * self._lever_squares())
             if not len(frames):
                 return
             start = self.columns[:, frames]
             turning = np.concatenate([self.angles, self.vectors])
-            beside = random.normal(0.0, BESIDE, (len(turning), len(frames)))
-            start[turning] += beside / self.targets.chain.radians
+            noise = random.normal(0.0, RESTART_NOISE, (len(turning), len(frames)))
+            start[turning] += noise / self.targets.chain.radians
             solution = self._refine(start, start, weight, MOST_STEPS, frames)
             self._accept(solution, self.errors[frames], frames)
 
@@ -132,20 +139,20 @@ class _Solution:
             self.columns[columns] = angles.T / radians
 
     def _repair_outliers(self, weight: Floats) -> None:
-        """Solve outlier frames again, from a line between their neighbors."""
-        odd = self._find_outliers()
-        good = np.flatnonzero(~odd)
-        frames = np.flatnonzero(odd)
+        """Solve outlier frames again, from the interpolation of their neighbors."""
+        is_outlier = self._find_outliers()
+        good = np.flatnonzero(~is_outlier)
+        frames = np.flatnonzero(is_outlier)
         if not len(good) or not len(frames):
             return
         line = np.stack([np.interp(frames, good, track[good]) for track in self.columns])
-        limit = self.errors[frames] * (1 + SAME) + self._unit_error() * NOTHING
-        self._accept(self._refine(line, line, weight, MENDING_STEPS, frames), limit, frames)
+        limit = self.errors[frames] * (1 + EQUAL_ERRORS) + self._lever_squares() * NEGLIGIBLE_SQUARE
+        self._accept(self._refine(line, line, weight, REPAIR_STEPS, frames), limit, frames)
 
     def _find_outliers(self) -> Bools:
         """Frames that miss more than usual, lack a target, or lie between two jumps.
 
-        What most frames do is not odd.
+        A reason that holds for more than MOST_OUTLIERS of the frames is ignored.
         """
         counts = self.known.sum(axis=0)
         turning = np.concatenate([self.angles, self.vectors])
@@ -153,37 +160,38 @@ class _Solution:
         jumps = np.flatnonzero((np.abs(steps) > JUMP).any(axis=0)) + 1
         reasons = (
             counts < counts.max(),
-            self.errors > BAD**2 * np.median(self.errors) + self._unit_error() * NOTHING,
+            self.errors
+            > OUTLIER_RATIO**2 * np.median(self.errors) + self._lever_squares() * NEGLIGIBLE_SQUARE,
             _between(jumps, len(counts)),
         )
-        odd = np.zeros(len(counts), np.bool_)
+        is_outlier = np.zeros(len(counts), np.bool_)
         for reason in reasons:
-            if np.count_nonzero(reason) < FEW * len(counts):
-                odd |= reason
-        return odd
+            if np.count_nonzero(reason) < MOST_OUTLIERS * len(counts):
+                is_outlier |= reason
+        return is_outlier
 
-    def _unit_error(self) -> float:
+    def _lever_squares(self) -> float:
         """The sum of squares where every target is a typical lever away."""
         return max(1, len(self.targets)) * self.targets.lever**2
 
     def _smooth(self) -> None:
         """Smooth the values towards their neighbor frames where distances remain, as with noise.
 
-        The remaining distances say how much a position is to be believed, and what people do says
-        how far angles stray from their mean over some frames.
+        The remaining distances estimate the noise of positions; ANGLE_SPREAD is the usual variation
+        of human angles.
         """
         n_free = np.count_nonzero(self.targets.units)
         freedoms = 3 * self.known.sum() - n_free * self.known.shape[1]
         if freedoms <= 0:
             return
         square = float(self.errors.sum() / freedoms)
-        if square < (EXACT * self.targets.lever) ** 2:
+        if square < (EXACT_FIT * self.targets.lever) ** 2:
             return
-        weight = np.full((len(self.columns), 1), square / (STEADY * self.targets.lever) ** 2)
-        limit = self.errors + LOOSER * n_free * square
-        for around in AROUND:
+        weight = np.full((len(self.columns), 1), square / (ANGLE_SPREAD * self.targets.lever) ** 2)
+        limit = self.errors + MOST_EXCESS * n_free * square
+        for around in WINDOWS:
             prior = _means(self.columns, around)
-            self._accept(self._refine(self.columns, prior, weight, STEADY_STEPS), limit)
+            self._accept(self._refine(self.columns, prior, weight, SMOOTHING_STEPS), limit)
 
 
 def _between(jumps: Ints, n_frames: int) -> Bools:
@@ -192,7 +200,7 @@ def _between(jumps: Ints, n_frames: int) -> Bools:
     borders = np.concatenate([[0], jumps, [n_frames]])
     lengths = np.diff(borders)
     for k in range(1, len(lengths) - 1):
-        if lengths[k] < max(SHORT, min(lengths[k - 1], lengths[k + 1])):
+        if lengths[k] < max(SHORT_RUN, min(lengths[k - 1], lengths[k + 1])):
             between[borders[k] : borders[k + 1]] = True
     return between
 
@@ -200,14 +208,14 @@ def _between(jumps: Ints, n_frames: int) -> Bools:
 def _targets_seen(
     targets: Targets, points: Floats, markers: Floats | None
 ) -> tuple[Floats, Floats]:
-    """Positions (n_targets, 3, F), 0 where unknown, and 1 where known, else 0, (n_targets, F)."""
+    """(positions (n_targets, 3, F), 0 where unknown; 1.0 where known, else 0.0, (n_targets, F))."""
     skeleton = targets.skeleton
     n_markers = 0 if markers is None else 3 * skeleton.n_joints
-    wanted = {"points": (points, len(targets) - n_markers), "virtual markers": (markers, n_markers)}
-    for what, (positions, count) in wanted.items():
+    shapes = {"points": (points, len(targets) - n_markers), "virtual markers": (markers, n_markers)}
+    for kind, (positions, count) in shapes.items():
         if positions is not None and (positions.ndim != 3 or positions.shape[1:] != (count, 3)):
             raise MotionError(
-                f"skeleton {skeleton.name!r} has {count} {what}, and their positions are of shape "
+                f"skeleton {skeleton.name!r} has {count} {kind}, and their positions are of shape "
                 f"{positions.shape}, not (n_frames, {count}, 3)"
             )
     if markers is not None and len(markers) != len(points):
@@ -229,13 +237,13 @@ def _means(tracks: Floats, around: int) -> Floats:
     return result
 
 
-BLOCK_NUMBERS = 2**22  # of a Jacobian at a time, 32 MB
+BLOCK_NUMBERS = 2**22  # numbers of a Jacobian at a time, 32 MB
 START_DAMPING, LEAST_DAMPING = 1e-3, 1e-9  # of the mean of the normal matrix's diagonal
-EASIER, HARDER = 0.2, 5.0
-GIVE_UP = 1e9  # damping at which no step helps any more
-CLOSE = 1e-6  # change of cost, relative, by which a frame is done
-NEGLIGIBLE = 1e-9  # of the typical lever: a distance that counts as met
-LEAST = 1e-12  # added to the diagonal, so that what moves nothing stays where it is
+LESS_DAMPING, MORE_DAMPING = 0.2, 5.0
+GIVE_UP = 1e9  # greatest damping; larger ones end the search
+CONVERGED = 1e-6  # relative change of cost at which a frame is finished
+NEGLIGIBLE = 1e-9  # typical levers: a distance that counts as 0
+DIAGONAL_FLOOR = 1e-12  # added to the diagonal, so the matrix is regular
 
 
 def refine(
@@ -247,10 +255,11 @@ def refine(
     weight: Floats,
     most_steps: int,
 ) -> tuple[Floats, Floats]:
-    """Values (n_channels, F) from which no step leads nearer, and the sums of squares there, (F,).
+    """Minimize the squared distances; return values (n_channels, F) and sums of squares, (F,).
 
-    Least is the sum over targets of |position - seen|^2 where ``known`` is 1, plus ``weight``,
-    (n_channels, 1), times the squares of the steps, in ``targets.units``, from ``prior``.
+    The objective is the sum over targets of |position - seen|^2 where ``known`` is 1, plus
+    ``weight``, (n_channels, 1), times the squares of the steps, in ``targets.units``, from
+    ``prior``.
     """
     result, errors = columns.copy(), np.empty(columns.shape[1])
     per_frame = 3 * max(1, len(targets)) * max(1, len(columns))
@@ -263,7 +272,7 @@ def refine(
 
 
 class _Descent:
-    """A block of frames on its way down."""
+    """Damped Gauss-Newton over a block of frames."""
 
     def __init__(
         self, targets: Targets, seen: Floats, known: Floats, prior: Floats, weight: Floats
@@ -286,16 +295,16 @@ class _Descent:
             better = cost < before
             at = active[better]
             columns[:, at], costs[at], errors[at] = trial[:, better], cost[better], error[better]
-            factor = np.where(better, EASIER, HARDER)
+            factor = np.where(better, LESS_DAMPING, MORE_DAMPING)
             damping[active] = np.maximum(damping[active] * factor, LEAST_DAMPING)
-            near = np.abs(before - cost) <= CLOSE * before + self._floor()
+            near = np.abs(before - cost) <= CONVERGED * before + self._floor()
             active = active[~(near | (damping[active] > GIVE_UP))]
             if not len(active):
                 break
         return columns, errors
 
     def _floor(self) -> float:
-        """A sum of squares below which only rounding errors are left."""
+        """Costs that differ by less are equal up to rounding."""
         return len(self.targets) * (NEGLIGIBLE * self.targets.lever) ** 2
 
     def _objectives(self, columns: Floats, frames: Ints) -> tuple[Floats, Floats]:
@@ -329,6 +338,6 @@ class _Descent:
         slope = (matrix @ missed.reshape(-1, n_frames).T[:, :, None])[:, :, 0]
         slope -= (self.weight[self.free] * self._steps_from_prior(columns, frames)).T
         diagonal = np.einsum("fcc->fc", normal)
-        level = damping * diagonal.mean(axis=1) + LEAST
+        level = damping * diagonal.mean(axis=1) + DIAGONAL_FLOOR
         diagonal += self.weight[self.free].T + level[:, None]
         return np.array(np.linalg.solve(normal, slope[:, :, None])[:, :, 0].T, np.float64)

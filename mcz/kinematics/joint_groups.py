@@ -18,14 +18,15 @@ GROUPS = {
 }
 _SIDE = "(?:left|right|l|r)"
 _PART = "(?:foot|fore ?foot|ankle|heel|hee|ball|toe ?base|toes?|toe0)"
-# The side first or last, anything that ends in no letter before: "Bip01 L Foot", "mixamorig:...".
+# The side first or last, before it any text that ends without a letter: "Bip01 L Foot",
+# "mixamorig:...".
 _FOOT = re.compile(rf"(?:.*[^a-z])?(?:{_SIDE} ?{_PART}|{_PART} ?{_SIDE})", re.DOTALL)
 _HUMP = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _BETWEEN = re.compile(r"[\s_.\-]+")
 
 
 def is_foot(name: str) -> bool:
-    """Tell whether a joint of this name is a part of a foot, by docs/guides/contacts.md.
+    """Return True if a joint of this name is a part of a foot, by docs/guides/contacts.md.
 
     >>> [is_foot(name) for name in ("lfoot", "LeftToeBase", "Bip01 R Toe0", "foot_L", "lfemur")]
     [True, True, True, True, False]
@@ -40,7 +41,7 @@ def find_feet(skeleton: Skeleton) -> list[int]:
 
 
 def find_joints(skeleton: Skeleton, name: str, option: str) -> list[int]:
-    """The joints that ``name`` means: a joint of that name, or else a group.
+    """The joints for ``name``: a joint of that name, or else a group.
 
     Raises OptionError, which names the ``option``.
     """

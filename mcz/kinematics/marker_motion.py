@@ -1,12 +1,11 @@
-"""Positions as a domain: a motion as the positions of its points, markers that name their skeleton.
+"""Motions of markers: one marker at each point of a skeleton, for codecs of positions.
 
-SPEC.md, "Kinematics", has the points, and "Positions" there what a clip of them says. The way back
-is in ``mcz/exchange/conversion/marker_fit.py``.
+SPEC.md, "Kinematics", defines the points; its section "Positions" defines the fields of such a
+clip. ``mcz/exchange/conversion/marker_fit.py`` is the inverse.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,16 +15,16 @@ from mcz.kinematics.points import point_names, point_set, points_and_markers_of,
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.types import Floats
 
-NOTE = "positions by forward kinematics"  # begins the source-note of what was computed
+NOTE = "positions by forward kinematics"  # the source-note of a computed motion begins with it
 SEPARATOR = "; "
 
 
 def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
-    """``motion`` as markers at its points; with ``virtual_markers`` three more for every joint.
+    """Markers at the points of ``motion``; with ``virtual_markers`` three more for every joint.
 
-    The markers are in the length unit and up axis of the skeleton, ``skeleton.base`` is left to
-    whoever writes it (see ``Prepared``), and there is no source, for it could not be restored. A
-    position that is not known is 0 under a mask. A motion of markers is returned as it is.
+    The markers have the length unit and up axis of the skeleton. ``skeleton.base`` is not set: the
+    writer sets it. There is no source, since it could not be restored. An unknown position is 0
+    under a mask. A motion of markers is returned unchanged.
 
     Raises MotionError where the skeleton has no kinematics, OptionError for virtual markers where
     its length unit is unknown.
@@ -34,12 +33,14 @@ def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
     if point_set(skeleton) == "markers":
         return motion
     if not first.has_poses:
-        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
-    channels = np.asarray(motion.values, np.float64)
-    values = marker_values(skeleton, channels, virtual_markers=virtual_markers)
-    valid = ~np.isnan(values)
+        raise MotionError(
+            "the channels of its motion signal differ from those of its skeleton", clip=motion.name
+        )
+    values = np.asarray(motion.values, np.float64)
+    positions = marker_values(skeleton, values, virtual_markers=virtual_markers)
+    valid = ~np.isnan(positions)
     signal = Signal(
-        np.where(valid, values, 0.0),
+        np.where(valid, positions, 0.0),
         name=first.name,
         samples_per_frame=first.samples_per_frame,
         mask=None if valid.all() else valid,
@@ -77,7 +78,7 @@ def marker_skeleton(
 def marker_values(skeleton: Skeleton, values: Floats, *, virtual_markers: bool = False) -> Floats:
     """The values of ``marker_skeleton``, (n_frames, n_channels), NaN where a position is unknown.
 
-    ``values`` are those of ``skeleton``, (n_frames, its channels). Raises as ``in_positions`` does.
+    ``values`` are the values of ``skeleton``, (n_frames, its channels). Raises as ``in_positions``.
     """
     if virtual_markers:
         positions = np.concatenate(points_and_markers_of(skeleton, values), axis=1)
@@ -92,17 +93,12 @@ def virtual_marker_names(skeleton: Skeleton) -> list[str]:
 
 
 def _note(motion: Motion) -> str:
-    parts = [NOTE if motion.source is None else f"{NOTE} of {motion.source.format.upper()}"]
-    return SEPARATOR.join([*parts, *_notes(motion)])
-
-
-def _notes(motion: Motion) -> Iterator[str]:
-    if note := motion.metadata.get("source-note", ""):
-        yield note
+    note = NOTE if motion.source is None else f"{NOTE} of {motion.source.format.upper()}"
+    return SEPARATOR.join(filter(None, [note, motion.metadata.get("source-note")]))
 
 
 def without_note(motion: Motion) -> dict[str, str]:
-    """The metadata of ``motion`` before ``in_positions`` spoke in them."""
+    """The metadata of ``motion`` without the note that ``in_positions`` adds."""
     metadata = dict(motion.metadata)
     note = metadata.pop("source-note", "")
     if note.startswith(NOTE):

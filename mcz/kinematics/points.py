@@ -14,16 +14,14 @@ from mcz.model.motion import POSITION_KINDS, Joint, Motion, Skeleton
 from mcz.model.types import Floats
 
 MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
-SHELL_CM = (
-    3.0  # of a point of the shell from its joint's origin, unless another radius is asked for
-)
+SHELL_CM = 3.0  # from a joint's origin to a point of its shell, the default
 
 
 class Places(NamedTuple):
     """Positions over time, each float64 (n_frames, n, 3) in length units.
 
     ``points`` as of ``positions``, ``markers`` as of ``virtual_markers_of``, ``shell`` as of
-    ``shell_points_of``; empty (n = 0) where they were not asked for.
+    ``shell_points_of``; empty (n = 0) if not requested.
     """
 
     points: Floats
@@ -34,12 +32,14 @@ class Places(NamedTuple):
 def positions(motion: Motion) -> Floats:
     """Positions of the points of ``motion``, float64 (n_frames, n_points, 3), in length units.
 
-    ``point_names`` says which points these are. A point that depends on an invalid value is NaN.
-    Raises MotionError where the skeleton has no kinematics: its angle unit is unknown, or all of
-    its channels are plain scalars.
+    ``point_names`` lists these points. A point that depends on an invalid value is NaN. Raises
+    MotionError where the skeleton has no kinematics: its angle unit is unknown, or all of its
+    channels are plain scalars.
     """
     if not motion.signals[0].has_poses:
-        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
+        raise MotionError(
+            "the channels of its motion signal differ from those of its skeleton", clip=motion.name
+        )
     return positions_of(motion.skeleton, np.asarray(motion.values, np.float64))
 
 
@@ -70,9 +70,9 @@ def virtual_markers_of(skeleton: Skeleton, values: Floats) -> Floats:
 def shell_points_of(skeleton: Skeleton, values: Floats, radius_cm: float = SHELL_CM) -> Floats:
     """Three points a joint, ``radius_cm`` off its origin along the axes that turn with it.
 
-    float64 (n_frames, 3 n_joints, 3) in length units. These axes are those of the world in the
-    rest pose, whatever ``axis`` says. Raises OptionError where the length unit is unknown,
-    otherwise as ``positions``.
+    float64 (n_frames, 3 n_joints, 3) in length units. In the rest pose these axes are the world's
+    axes, independent of ``axis``. Raises OptionError where the length unit is unknown, otherwise as
+    ``positions``.
     """
     return _Positions(skeleton, values, shell_cm=radius_cm).shell
 
@@ -156,13 +156,13 @@ def marker_distance(skeleton: Skeleton) -> float:
 
 
 def check_radius(radius_cm: float) -> None:
-    """Raise OptionError where this is no radius of a shell."""
+    """Raise OptionError for a bad radius of a shell."""
     if not 0 < radius_cm < np.inf:
         raise OptionError(f"a shell of {radius_cm} cm: its radius is a length above 0")
 
 
 def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
-    """``radius_cm`` in length units; OptionError where there is no such length."""
+    """``radius_cm`` in length units; OptionError where the unit is unknown."""
     check_radius(radius_cm)
     if skeleton.unit_cm is None:
         raise OptionError(
@@ -174,7 +174,7 @@ def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
 
 
 def discard_infinite(points: Floats) -> None:
-    """Make points NaN of which not every coordinate, in the last axis, is finite."""
+    """Make points NaN that have a coordinate, in the last axis, that is not finite."""
     known = np.isfinite(points)
     if not known.all():  # a search in the last axis takes twenty times as long
         points[~known.all(axis=-1)] = np.nan
@@ -254,7 +254,7 @@ def depths(skeleton: Skeleton) -> Floats:
 def reach(skeleton: Skeleton) -> float:
     """The size of a skeleton: greatest distance of a point from its root in the rest pose.
 
-    In length units; 0.0 where there is no point but roots, infinity beyond the range of floats.
+    In length units; 0.0 for roots alone, infinity beyond the range of floats.
     """
     origins: list[Floats] = []
     greatest = 0.0

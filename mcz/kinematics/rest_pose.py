@@ -1,4 +1,4 @@
-"""The rest pose: every joint at its offset, nothing turned. Whether it has any lengths."""
+"""The rest pose: every joint at its offset, unturned; a check of its lengths."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HEAD = re.compile("head|neck", re.IGNORECASE)
 def has_no_lengths(skeleton: Skeleton) -> bool:
     """Return True if joints turn, but all coincide with their root in any pose.
 
-    Arrays of body models are such: how long bones are stands in a model, not in them.
+    Arrays of body models are such: a model has the lengths of the bones, not the arrays.
     """
     below = [joint for joint in skeleton.joints if joint.parent >= 0]
     turned = any(channel.kind for joint in below for channel in joint.channels)
@@ -31,8 +31,8 @@ def has_no_lengths(skeleton: Skeleton) -> bool:
 def rest_positions(skeleton: Skeleton) -> Floats:
     """Positions of the joints at rest, float64 (n_joints, 3), in length units.
 
-    Nothing is turned, moved or stretched: rotation and length channels are 0, scales are 1. A
-    joint whose position channels replace its offset lies at its offset, too, for 0 would put it
+    No joint is turned, moved or stretched: rotation and length channels are 0, scales are 1. A
+    joint whose position channels replace its offset also lies at its offset, for 0 would put it
     onto its parent.
     """
     positions = skeleton.offsets
@@ -45,8 +45,8 @@ def rest_positions(skeleton: Skeleton) -> Floats:
 def figure_height(skeleton: Skeleton) -> float | None:
     """The greatest extent at rest of a figure that has feet and a head by name, in length units.
 
-    None of any other, such as a hand, a face, a prop or markers. Standing figures are as high, and
-    those with arms stretched out about as wide.
+    None for any other, such as a hand, a face, a prop or markers. It is the height of a standing
+    figure, and about the width of one with arms stretched out.
     """
     names = (joint.name for joint in skeleton.joints)
     if len(find_feet(skeleton)) < 2 or not any(map(_HEAD.search, names)):
@@ -62,13 +62,13 @@ def figure_height(skeleton: Skeleton) -> float | None:
 
 
 def height_note(skeleton: Skeleton) -> str:
-    """A note on a figure of no person's height, perhaps of a wrong unit; or ""."""
+    """A note on a figure of an inhuman height, perhaps of a wrong unit; or ""."""
     height, unit_cm = figure_height(skeleton), skeleton.unit_cm
     return "" if height is None or unit_cm is None else note_on_height(height, unit_cm)
 
 
 def note_on_height(height: float, unit_cm: float) -> str:
-    """The same of a height in length units.
+    """The same for a height in length units.
 
     >>> note_on_height(27.5, 2.54)
     "height 27.5 units = 69.9 cm, which is no person's; is 1 unit = 2.54 cm right?"

@@ -1,7 +1,7 @@
 """Fit of a joint's rotation channels to a target rotation.
 
-One angle at a time, then damped Gauss-Newton steps, each frame damped for itself, where that gets
-on slowly: at two axes that fall together.
+One angle at a time, then damped Gauss-Newton steps, each frame with its own damping, where that
+converges slowly: at two axes that fall together.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def set_turns(link: Link, moment: Floats, columns: Floats, radians: float) -> No
 
     ``moment`` has shape (3, 3, F) and is along the joint's own axes; ``columns``, (n_channels, F)
     in source units, are written. Where ``moment`` is a rotation, R is the nearest to it. A
-    quaternion, or else a rotation vector, makes R alone, whatever else the joint has.
+    quaternion, or else a rotation vector, determines R alone.
     """
     if link.is_whole:
         columns[link.turning] = 0.0
@@ -55,7 +55,7 @@ def _nearest_rotations(moment: Floats) -> Floats:
 
 
 def smallest_angles(angles: Floats) -> Floats:
-    """The same rotations by angles (n_frames, 3) nearer to zero on the whole, just as continuous.
+    """The same rotations by angles (n_frames, 3) nearer to zero overall, equally continuous.
 
     Three angles (a, b, c) about different axes turn as (a + pi, pi - b, c + pi) do.
     """
@@ -64,7 +64,7 @@ def smallest_angles(angles: Floats) -> Floats:
 
 
 def center_angles(angles: Floats) -> Floats:
-    """Angles, (n_frames, n), less whole turns: their means are within half a turn of zero."""
+    """Angles, (n_frames, n), shifted by whole turns: their means are within half a turn of zero."""
     if not len(angles):
         return angles
     result: Floats = angles - 2 * np.pi * np.rint(angles.mean(axis=0) / (2 * np.pi))
@@ -112,24 +112,24 @@ def _rotate_left(matrix: Floats, axis: int, angle: Floats) -> Floats:
 
 
 STEPS = 40
-FLAT = 1e-14  # of the gradient, whose greatest is about 1: no way up any more
-ROUNDING = 1e-15  # of the trace, by which the last and best steps are not told apart
+FLAT = 1e-14  # of the gradient, whose greatest is about 1: no further gain
+ROUNDING = 1e-15  # of the trace: smaller differences are rounding
 START_DAMPING, EASIER, HARDER = 1e-3, 0.1, 10.0
 
 
-def polish_turns(link: Link, wanted: Floats, columns: Floats, radians: float) -> None:
+def polish_turns(link: Link, target: Floats, columns: Floats, radians: float) -> None:
     """Improve the angles of a joint in ``columns``, (n_channels, F) in source units.
 
-    It turns by angles about axes alone. ``wanted`` are rotation matrices (3, 3, F) along
-    the joint's own axes.
+    The joint has only angles about axes. ``target`` are rotation matrices (3, 3, F) along the
+    joint's own axes.
     """
     axes, own = [axis for axis, _ in link.turns], link.angles
     angles = columns[own] * radians
     damping = np.full(angles.shape[1], START_DAMPING)
     turn, spins = _turn(axes, angles)
-    near = _nearness(turn, wanted)
+    near = _nearness(turn, target)
     for _ in range(STEPS):
-        gradient = np.einsum("kif,if->fk", spins, _vector(wanted, turn))
+        gradient = np.einsum("kif,if->fk", spins, _vector(target, turn))
         if np.abs(gradient).max(initial=0.0) < FLAT:
             break
         normal = 2 * np.einsum("kif,lif->fkl", spins, spins)
@@ -137,7 +137,7 @@ def polish_turns(link: Link, wanted: Floats, columns: Floats, radians: float) ->
         step = np.linalg.solve(normal, gradient[:, :, None])[:, :, 0].T
         trial = angles + step
         trial_turn, trial_spins = _turn(axes, trial)
-        trial_near = _nearness(trial_turn, wanted)
+        trial_near = _nearness(trial_turn, target)
         better = trial_near > near - ROUNDING
         angles = np.where(better, trial, angles)
         near = np.where(better, trial_near, near)
@@ -156,13 +156,13 @@ def _turn(axes: list[int], angles: Floats) -> tuple[Floats, Floats]:
     return rotation, spins
 
 
-def _nearness(rotation: Floats, wanted: Floats) -> Floats:
-    """The trace of R' M, 3 where they are the same, (F,)."""
-    result: Floats = (rotation * wanted).sum(axis=(0, 1))
+def _nearness(rotation: Floats, target: Floats) -> Floats:
+    """The trace of R' M, 3 where they are equal, (F,)."""
+    result: Floats = (rotation * target).sum(axis=(0, 1))
     return result
 
 
-def _vector(wanted: Floats, rotation: Floats) -> Floats:
-    """Twice the sine of the angle from ``rotation`` to ``wanted``, times the axis, (3, F)."""
-    left = multiply_matrices(wanted, np.swapaxes(rotation, 0, 1))
+def _vector(target: Floats, rotation: Floats) -> Floats:
+    """Twice the sine of the angle from ``rotation`` to ``target``, times the axis, (3, F)."""
+    left = multiply_matrices(target, np.swapaxes(rotation, 0, 1))
     return np.stack([left[2, 1] - left[1, 2], left[0, 2] - left[2, 0], left[1, 0] - left[0, 1]])

@@ -20,7 +20,7 @@ FULL_TURN = 2 * np.pi
 def matrices_of_vectors(vectors: Floats) -> Floats:
     """The rotations by |v| about v, (3, 3, F); the identity where v is 0, NaN where not finite."""
     angle = _length(vectors)
-    # np.sinc is sin(pi x) / (pi x), and 1 at 0: there is no division to go wrong near zero.
+    # np.sinc is sin(pi x) / (pi x), and 1 at 0: no division by zero.
     first, half = np.sinc(angle / np.pi), np.sinc(angle / FULL_TURN)
     return _combine_vectors(vectors, first, half * half / 2, angle)
 
@@ -114,9 +114,9 @@ def vectors_of_quaternions(quaternions: Floats) -> Floats:
 def continuous(vectors: Floats, start: Floats | None = None) -> Floats:
     """The same rotations by vectors each near the one before, (3, F).
 
-    v and v (1 + 2 pi n / |v|) turn alike. The first is taken near ``start``, (3,), or as short as
-    it can be; each other is the one of these that is nearest to the one before. Where v is 0, any
-    axis does: that of the vector before is taken. What is not finite is passed over.
+    v and v (1 + 2 pi n / |v|) turn alike. The first is the one nearest to ``start``, (3,), or the
+    shortest; each other is the one nearest to the vector before. Where v is 0, the axis of the
+    vector before is used. Vectors that are not finite are skipped.
     """
     out = np.array(vectors, np.float64)
     last: Any = np.zeros(3) if start is None else np.asarray(start, np.float64)
@@ -125,23 +125,24 @@ def continuous(vectors: Floats, start: Floats | None = None) -> Floats:
     return out
 
 
-def nearest_vector(vector: Floats, wanted: Floats) -> Floats:
-    """The vector (3,) nearest to ``wanted`` with the rotation of ``vector``."""
+def nearest_vector(vector: Floats, target: Floats) -> Floats:
+    """The vector (3,) nearest to ``target`` with the rotation of ``vector``."""
     length = float(np.sqrt(vector @ vector))
     if length:
         axis = vector / length
-    elif (size := float(np.sqrt(wanted @ wanted))) > np.pi:
-        axis = wanted / size
+    elif (size := float(np.sqrt(target @ target))) > np.pi:
+        axis = target / size
     else:
         return vector
-    turns = np.rint((float(wanted @ axis) - length) / FULL_TURN)
+    turns = np.rint((float(target @ axis) - length) / FULL_TURN)
     return vector if turns == 0 else axis * (length + FULL_TURN * turns)
 
 
 # The most common order of BVH files first.
 ORDERS = ("zyx", "zxy", "yxz", "xyz", "xzy", "yzx")
-STEEP = np.sin(np.deg2rad(80))  # beyond it the outer axes nearly fall together: try other orders
-LOCKED = 1e-14  # cosine below which they do; to choose an angle then costs as much, in radians
+# beyond it the outer axes nearly fall together: other orders are tried
+STEEP = np.sin(np.deg2rad(80))
+LOCKED = 1e-14  # cosine below which they do; any choice of an angle then costs as much, in radians
 
 
 def euler_order(turns: Floats) -> str:
@@ -158,8 +159,8 @@ def euler_angles(turns: Floats, order: str) -> Floats:
     """Angles in radians, (n_frames, 3), about the turned axes of ``order``, that make ``turns``.
 
     Of the two solutions of each frame, and of full turns, those nearest to the frame before are
-    taken. The first and second angle are solved after the third, so that the three of them make
-    the matrix to rounding even in gimbal lock, where the third is that of the frame before.
+    chosen. The first and second angle are solved after the third, so that all three restore the
+    matrix to rounding even in gimbal lock, where the third keeps the value of the frame before.
     """
     i, j, k = ("xyz".index(letter) for letter in order)
     sign = _sign(order)
@@ -189,8 +190,8 @@ def _hold_last(angles: Floats, known: Floats) -> Floats:
 def nearest_solutions(angles: Floats) -> Floats:
     """Choose (a, b, c) or (a + pi, pi - b, c + pi) per frame, the one nearer to the frame before.
 
-    Which of them is nearer does not depend on which of them the frame before took, as both change
-    alike; so changes can be found for all frames at once.
+    The nearer one does not depend on the choice of the frame before, as both change alike; so
+    changes can be found for all frames together.
     """
     other = angles * [1, -1, 1] + np.pi
     stays, changes = (

@@ -1,6 +1,6 @@
 """Targets of inverse kinematics: points, virtual markers, and their Jacobian.
 
-A target is a position fastened to a joint: a point, or a virtual marker beside the joint's first
+A target is a position fastened to a joint: a point, or a virtual marker near the joint's first
 point. Arrays of a block of frames have the frames last.
 """
 
@@ -16,7 +16,7 @@ from mcz.kinematics.points import marker_distance, point_position, points_of, re
 from mcz.model.motion import Skeleton
 from mcz.model.types import Floats, Ints
 
-TYPICAL_LEVER = 0.125  # of the reach: to turn by one radian counts as to move by so much
+TYPICAL_LEVER = 0.125  # of the reach: a turn by one radian counts as a move by this length
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,8 @@ class Target:
 class Targets:
     """The targets of a skeleton in the order of their positions: points, then virtual markers.
 
-    ``units``, (n_channels,): the source units of each channel that count as one length unit, in
-    which all steps are measured; 0 of channels that move nothing.
+    ``units``, (n_channels,): the source units of each channel that count as one length unit, the
+    measure of all steps; 0 of channels that move no target.
     """
 
     def __init__(self, skeleton: Skeleton, *, markers: bool) -> None:
@@ -65,7 +65,6 @@ class Targets:
         return units
 
     def _below(self) -> list[Ints]:
-        """Targets of every joint and of the joints below it."""
         below: list[list[int]] = [[] for _ in self.chain.links]
         for number, target in enumerate(self.list):
             joint = target.joint
@@ -75,7 +74,7 @@ class Targets:
         return [np.array(numbers, np.int64) for numbers in below]
 
     def neutral(self, n_frames: int) -> Floats:
-        """Values that turn, move and stretch nothing, (n_channels, F)."""
+        """Values that turn, move and stretch no joint, (n_channels, F)."""
         columns = np.zeros((self.skeleton.n_channels, n_frames))
         for link in self.chain.links:
             columns[[c for _, c in link.scales]] = 1.0
@@ -122,7 +121,7 @@ class Targets:
     def _stretches(
         self, joint: int, link: Link, columns: Floats, pose: Pose
     ) -> Iterator[tuple[int, Ints, Floats]]:
-        """Lengths and scales: channel, the targets that it moves, and how far."""
+        """Lengths and scales: channel, targets, and their displacements a unit."""
         if not link.lengths and not link.scales:
             return
         axes = pose.axes[joint]
@@ -161,7 +160,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def unsolved_channels(skeleton: Skeleton) -> tuple[str, ...]:
-    """The channels, ``joint.channel``, that inverse kinematics leaves at 0: they move nothing."""
+    """The channels, ``joint.channel``, that inverse kinematics leaves at 0: they move no target."""
     units = Targets(skeleton, markers=False).units
     pairs = zip(skeleton.channel_addresses(), units, strict=True)
     return tuple(name for name, unit in pairs if not unit)

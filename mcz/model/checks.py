@@ -16,24 +16,24 @@ from mcz.model.types import Items
 
 
 class Rule(NamedTuple):
-    """A form of a field in words, and the function that gives it; TypeError or ValueError."""
+    """A form of a field in words, and the function that converts to it; TypeError or ValueError."""
 
     words: str
     form: Callable[[Any], Any]
 
 
 def check_fields(thing: object, rules: Mapping[str, Rule]) -> None:
-    """Give fields of a frozen dataclass the form of their rules; MotionError names the field."""
+    """Convert fields of a frozen dataclass by their rules; MotionError names the field."""
     for name, rule in rules.items():
         value = getattr(thing, name)
         try:
-            found = rule.form(value)
+            converted = rule.form(value)
         except (TypeError, ValueError, OverflowError, AttributeError):
             kind = type(thing).__name__.lower()
             shown = " ".join(reprlib.repr(value).split())  # in one line
             raise MotionError(f"{kind}: {name} is {shown}, not {rule.words}") from None
-        if found is not value:
-            object.__setattr__(thing, name, found)
+        if converted is not value:
+            object.__setattr__(thing, name, converted)
 
 
 def _text(value: object) -> str:
@@ -119,7 +119,7 @@ def of_type(kind: type | tuple[type, ...], words: str) -> Rule:
 
 
 def one_of(choices: Collection[str]) -> Rule:
-    """The rule of a field that is one of some words."""
+    """The rule of a field that is one of ``choices``."""
 
     def form(value: object) -> str:
         if value not in choices:
@@ -130,19 +130,19 @@ def one_of(choices: Collection[str]) -> Rule:
 
 
 def several(rule: Rule, words: str) -> Rule:
-    """The rule of a tuple, or a list, of what another rule is of."""
+    """The rule of a tuple or list whose items follow another rule."""
 
     def form(value: object) -> tuple[object, ...]:
         items = _items(value)
         formed = tuple(map(rule.form, items))
-        same = items is value and all(map(operator.is_, formed, items))
-        return items if same else formed
+        is_unchanged = items is value and all(map(operator.is_, formed, items))
+        return items if is_unchanged else formed
 
     return Rule(words, form)
 
 
 def optional(rule: Rule) -> Rule:
-    """The rule of a field that may be None as well."""
+    """The rule of a field that may also be None."""
     return Rule(f"{rule.words} or None", lambda value: None if value is None else rule.form(value))
 
 
@@ -183,7 +183,7 @@ DATA_ITEMS = Rule("several bytes", _texts)
 
 
 def in_range(text: str, parse: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """``parse``, which takes what ``text`` says in words."""
+    """Attach ``text``, the range in words, to ``parse``."""
     parse.range = text  # type: ignore[attr-defined]
     return parse
 
@@ -225,7 +225,7 @@ def number(name: str, low: float, high: float) -> Callable[[Any], float]:
 def choice(
     name: str, among: tuple[str, ...], formerly: Mapping[str, str] = MappingProxyType({})
 ) -> Callable[[Any], str]:
-    """A parser of one word of several; ``formerly``: words of older files -> today's."""
+    """A parser of one word of several; ``formerly`` maps words of older files to present ones."""
 
     def parse(text: Any) -> str:
         if isinstance(text, str):

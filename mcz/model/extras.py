@@ -13,10 +13,10 @@ from mcz.errors import OptionError
 
 
 def import_extra(name: str, extra: str, *, package: str = "", purpose: str = "") -> ModuleType:
-    """The module ``name``; raises OptionError that names the extra where it is not installed.
+    """Import the module ``name``; raises OptionError that names the extra if it is not installed.
 
-    ``package`` is its name for users, where that is another one; ``purpose`` is a noun phrase, for
-    the message: "s3://takes/walk.mcz".
+    ``package`` is its name for users, if that is another one; ``purpose`` is a noun phrase for the
+    message, such as "s3://takes/walk.mcz".
     """
     package = package or name.partition(".")[0]
     try:

@@ -18,9 +18,9 @@ Rows = int | range | Ints
 def row_numbers(key: Any, n_rows: int, noun: str) -> Rows:
     """The rows among ``n_rows`` that ``key`` chooses, each 0 <= row < n_rows.
 
-    An int for an integer, a range for a slice, otherwise int64 of the shape of the index; of a
-    mask (bool, (n_rows,)) the numbers of its True. ``noun`` names a row in messages. Raises
-    OutOfRangeError, which is an IndexError too.
+    An int for an integer, a range for a slice, otherwise int64 of the shape of the index; for a
+    mask (bool, (n_rows,)) the numbers of its True entries. ``noun`` names a row in messages. Raises
+    OutOfRangeError, which is also an IndexError.
     """
     if key is Ellipsis:
         key = slice(None)
@@ -30,7 +30,7 @@ def row_numbers(key: Any, n_rows: int, noun: str) -> Rows:
         except (TypeError, ValueError) as error:
             raise OutOfRangeError(f"{noun}s {key}: {error}") from None
     if not isinstance(key, (bool, np.bool_)):
-        with suppress(TypeError):  # no single integer
+        with suppress(TypeError):  # not an integer
             return _single(operator.index(key), n_rows, noun)
     try:
         array = np.asarray(key)
@@ -60,15 +60,15 @@ def _single(number: int, n_rows: int, noun: str) -> int:
 
 
 def merged_ranges(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Ranges in order, those that touch as one.
+    """Sort ranges, and join those that touch.
 
     >>> merged_ranges([(8, 9), (0, 4), (4, 6)])
     [(0, 6), (8, 9)]
     """
-    found: list[tuple[int, int]] = []
+    merged: list[tuple[int, int]] = []
     for start, stop in sorted(ranges):
-        if found and start <= found[-1][1]:
-            found[-1] = found[-1][0], max(stop, found[-1][1])
+        if merged and start <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(stop, merged[-1][1])
         else:
-            found.append((start, stop))
-    return found
+            merged.append((start, stop))
+    return merged

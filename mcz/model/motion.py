@@ -1,6 +1,6 @@
 """The data model: Motion and, from their own modules, its parts, checked on creation.
 
-Nothing here reads or writes files. SPEC.md, "CLIP", has the stored form.
+SPEC.md, "CLIP", has the stored form.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ from mcz.model.clock import (
     known_timeline,
     numbering_of,
     numbers_or_rows,
-    part_begins,
+    part_first_time,
     timeline_of,
     times_fault,
-    times_form_fault,
+    times_signal_fault,
     unit_of_times,
 )
 from mcz.model.indexing import row_numbers
@@ -69,10 +69,10 @@ from mcz.model.types import Floats, Ints, Values
 
 
 def frame_rate_of(rate: Any, name: str) -> Fraction:
-    """A frame rate as a Fraction, the nearest one to a number of another kind; MotionError."""
+    """Convert a number to the nearest frame rate, a Fraction; raises MotionError."""
     if isinstance(rate, (bool, np.bool_)) or np.ndim(rate):
         raise MotionError(f"frame rate {rate!r}", clip=name)
-    with suppress(TypeError, ValueError, OverflowError):  # no number, NaN, infinite
+    with suppress(TypeError, ValueError, OverflowError):  # not a number, NaN, infinite
         exact = isinstance(rate, Fraction)
         value: Fraction = rate if exact else Fraction(float(rate)).limit_denominator(2**52)
         if value > 0:
@@ -99,11 +99,11 @@ class Motion:
     """A skeleton in motion: the motion signal first, then any others (analog, ...).
 
     ``frame_rate`` in frames a second, None while unknown; ``frame_rate_exact`` is False where the
-    source gave a rounded frame time. ``frame_numbers`` (int64, ascending) is None for 1, 2, 3, ...;
-    they count ``number_step`` from a frame to the next, more than 1 where frames were left out
-    evenly. ``first_time`` is when the first frame was, in seconds; None where its number tells it:
+    source has a rounded frame time. ``frame_numbers`` (int64, ascending) is None for 1, 2, 3, ...;
+    they usually rise by ``number_step``, more than 1 where frames were left out evenly.
+    ``first_time`` is the time of the first frame in seconds; None where its number implies it:
     frame 1 is at 0 s. ``metadata`` maps keys of SPEC.md's registry, or private ``x-`` keys, to
-    text. ``times`` says when each frame was.
+    text. ``times`` has the time of each frame.
     """
 
     skeleton: Skeleton
@@ -145,7 +145,7 @@ class Motion:
             raise MotionError(f"a number step of {self.number_step}", clip=self.name)
 
     def _check_roles(self) -> None:
-        """Give signals that have no role theirs; what SPEC.md asks of roles holds."""
+        """Give signals without a role theirs, and check the rules of SPEC.md on roles."""
         if any(signal.role is None for signal in self.signals):
             given = (
                 replace(signal, role="" if index else MOTION_ROLE)
@@ -165,13 +165,13 @@ class Motion:
             if signal.of is not None and (signal.of == index or not 0 <= signal.of < len(roles)):
                 raise MotionError(f"residuals of signal {signal.of}", clip=self.name)
             if signal.role == TIMES:
-                fault = times_form_fault(signal) or times_fault(signal.masked()[:, 0])
+                fault = times_signal_fault(signal) or times_fault(signal.masked()[:, 0])
                 if fault:
                     raise MotionError(f"signal {signal.name!r}: no times: {fault}", clip=self.name)
 
     @property
     def motion_signal(self) -> Signal | None:
-        """The signal with the role "motion", which is the first; None where there is none."""
+        """The signal with the role "motion", the first; None if there is none."""
         return self.signals[0] if self.signals[0].role == MOTION_ROLE else None
 
     def signals_of(self, role: str) -> tuple[Signal, ...]:
@@ -197,16 +197,16 @@ class Motion:
         return self.n_frames
 
     def __bool__(self) -> bool:
-        """True: a motion without frames is a motion, too."""
+        """True, also without frames."""
         return True
 
-    __iter__ = None  # no sequence: a part of it is a motion
+    __iter__ = None  # not a sequence: a part of it is a motion
 
     def __getitem__(self, frames: slice) -> Motion:
         """``motion[10:20]``: frames 10 to 19 of all signals, with their numbers, as a Motion.
 
-        Its source, if any, then describes no file. Raises OutOfRangeError for all but a slice of
-        step 1.
+        Its source, if any, then describes no file. Raises OutOfRangeError for anything but a slice
+        of step 1.
         """
         if not isinstance(frames, slice):
             raise OutOfRangeError(f"a motion is cut by a slice such as [10:20], not by {frames!r}")
@@ -216,7 +216,7 @@ class Motion:
         return self.cut(chosen.start, max(chosen.start, chosen.stop))
 
     def cut(self, start: int, stop: int) -> Motion:
-        """Frames start <= f < stop alone, with their numbers and times."""
+        """Keep frames start <= f < stop, with their numbers and times."""
         if (start, stop) == (0, self.n_frames):
             return self
         numbers = self.frame_numbers
@@ -224,7 +224,7 @@ class Motion:
             numbers = numbers_or_rows(numbers, self.n_frames)
         first_time = self.first_time
         if first_time is not None:
-            first_time = part_begins(first_time, self.timeline, start, stop)
+            first_time = part_first_time(first_time, self.timeline, start, stop)
         return replace(
             self,
             signals=tuple(signal.cut(start, stop) for signal in self.signals),
@@ -255,7 +255,7 @@ class Motion:
         return known_timeline(self.name, self.timeline).times
 
     def at_rate(self, rate: Fraction) -> Motion:
-        """The same frames and numbers at another frame rate, which times follow."""
+        """The same frames and numbers at another frame rate, which changes the times."""
         first_time = self.first_time
         if first_time is not None and self.frame_rate is not None:
             first_time *= float(self.frame_rate / rate)
@@ -266,9 +266,9 @@ class Motion:
         return replace(self, source=None).at_times(self.timeline)
 
     def counted_by_ones(self) -> Motion:
-        """The same motion at the same times with a ``number_step`` of 1, as files have it.
+        """The same motion at the same times with a ``number_step`` of 1, as files store it.
 
-        With a source, which may print the frame numbers, they are kept.
+        Frame numbers are kept if there is a source, which may print them.
         """
         if self.number_step == 1:
             return self
@@ -278,18 +278,18 @@ class Motion:
     def at_times(self, timeline: Timeline | None) -> Motion:
         """This motion at these times; None: at unknown ones.
 
-        Frame numbers are kept where they give such times, and with a source, which may print them;
-        else they are others, or the motion gets a signal ``time``.
+        Frame numbers are kept where they imply these times, and with a source, which may print
+        them; else they are changed, or the motion gets a signal ``time``.
         """
         motion = replace(self, first_time=None)
-        own = motion.timeline
-        if timeline is None or not self.n_frames or (own and own.is_near(timeline)):
+        current = motion.timeline
+        if timeline is None or not self.n_frames or (current and current.is_near(timeline)):
             return motion
         numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
-        found = numbering_of(timeline, numbers, kept=self.source is not None)
-        if found is not None:
-            first = found.first_time
-            return replace(motion, frame_numbers=found.numbers, first_time=first, number_step=1)
+        numbered = numbering_of(timeline, numbers, strict=self.source is not None)
+        if numbered is not None:
+            first = numbered.first_time
+            return replace(motion, frame_numbers=numbered.numbers, first_time=first, number_step=1)
         return motion._with_time_signal(timeline)
 
     def _with_time_signal(self, timeline: Timeline) -> Motion:
@@ -300,7 +300,7 @@ class Motion:
         return replace(self, signals=(*others, signal))
 
     def with_signals(self, kept: Sequence[int]) -> Motion:
-        """The same motion with these of its signals alone, in the order given.
+        """The same motion with only the signals ``kept`` (indices), in the order given.
 
         Residuals of a signal that is left out lose their role.
         """
@@ -308,7 +308,7 @@ class Motion:
         signals = []
         for signal in (self.signals[index] for index in kept):
             if signal.of is not None:
-                of = place.get(signal.of)
-                signal = replace(signal, of=of, role="" if of is None else signal.role)
+                target = place.get(signal.of)
+                signal = replace(signal, of=target, role="" if target is None else signal.role)
             signals.append(signal)
         return replace(self, signals=tuple(signals))

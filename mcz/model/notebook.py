@@ -1,6 +1,6 @@
 """Display of motions in notebooks, by the player that ``mcz`` registers.
 
-It stands apart from ``motion``: ``import mcz`` loads it, and must not wait for numpy.
+A module apart from ``motion``, since ``import mcz`` loads it and must not wait for numpy.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ _players: list[Player] = []
 
 
 def register_player(player: Player) -> None:
-    """Show motions by ``player``, which returns HTML."""
+    """Register ``player``, which returns HTML of a motion."""
     _players[:] = [player]
 
 

@@ -41,7 +41,7 @@ ROLES = (
 
 
 class Sampled(Protocol):
-    """The facts of a signal, in memory or in a file, that say whether its rows are poses."""
+    """The facts of a signal, in memory or in a file, that decide whether its rows are poses."""
 
     @property
     def channels(self) -> tuple[Channel, ...] | None: ...
@@ -52,9 +52,11 @@ class Sampled(Protocol):
 
 
 def check_poses(name: str, signal: Sampled) -> None:
-    """Raise MotionError where the rows of the first signal of ``name`` are no poses of frames."""
+    """Raise MotionError where the rows of the first signal of ``name`` are not poses of frames."""
     if not signal.has_poses:
-        raise MotionError("its channels are not those of its skeleton", clip=name)
+        raise MotionError(
+            "the channels of its motion signal differ from those of its skeleton", clip=name
+        )
     if signal.samples_per_frame != 1:
         raise MotionError(
             f"{signal.samples_per_frame} samples a frame are not one pose a frame", clip=name
@@ -93,11 +95,11 @@ class Signal:
     ``values`` has shape (n_frames * samples_per_frame, n_channels): binary64 in source units, or
     int64 where every grid is INTEGER. ``grids`` has one grid a channel; ``grid_changes`` lists
     (row, channel, grid) from that row on. ``mask`` (bool, same shape) is True where the value is
-    valid; None means valid everywhere. Stored coordinates are kept beneath an invalid mark.
+    valid; None means valid everywhere. Stored coordinates of invalid values are kept.
 
-    Where the file stores other numbers than it means (words of a converter), ``scaling`` says what
-    they mean, ``values`` are binary64 in units, and ``stored`` are the numbers of the file, which
-    grids, grid changes, exceptions and ordinals speak of. Elsewhere ``stored`` are the values.
+    Where the file stores words of a converter, ``scaling`` converts them: ``values`` are binary64
+    in units, and ``stored`` are the numbers of the file; grids, grid changes, exceptions and
+    ordinals refer to these. Elsewhere ``stored`` are the values.
 
     ``role`` is one of ``ROLES``, names of the registry in the order of their ids; None until the
     signal is in a Motion, whose first signal then is its "motion" and any other has none, "".
@@ -114,7 +116,7 @@ class Signal:
     channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
     ordinals: Ints | None = None  # on their grids; see ``to_ordinals``
     scaling: Scaling | None = None
-    stored: Values = None  # type: ignore[assignment]  # set below where it is not given
+    stored: Values = None  # type: ignore[assignment]  # set below if not given
     role: str | None = None
     of: int | None = None
 
@@ -156,7 +158,7 @@ class Signal:
             self.scaling.check(self.n_channels)
 
     def _take_mask(self, values: np.ma.MaskedArray[Any, Any]) -> None:
-        """Let what a masked array masks be invalid; its numbers are kept beneath."""
+        """Mark masked numbers of a masked array as invalid; the numbers are kept."""
         valid = ~np.ma.getmaskarray(values)
         object.__setattr__(self, "values", values.data)
         if self.mask is not None:
@@ -164,11 +166,13 @@ class Signal:
         object.__setattr__(self, "mask", valid)
 
     def _check_order(self) -> None:
-        """Exceptions and grid changes lie in the signal, exceptions in order."""
+        """Check that exceptions and grid changes lie in the signal, exceptions in order."""
         rows, channels = self.exceptions.rows, self.exceptions.channels
         cells = rows * max(1, self.n_channels) + channels
-        inside = (rows >= 0) & (rows < self.n_rows) & (channels >= 0) & (channels < self.n_channels)
-        if not inside.all() or (np.diff(cells) <= 0).any():
+        is_within = (
+            (rows >= 0) & (rows < self.n_rows) & (channels >= 0) & (channels < self.n_channels)
+        )
+        if not is_within.all() or (np.diff(cells) <= 0).any():
             raise MotionError(f"signal {self.name!r}: exceptions outside of it or out of order")
         for row, channel, grid in self.grid_changes:
             whole = row >= 0 and row % self.samples_per_frame == 0
@@ -186,7 +190,7 @@ class Signal:
 
     @property
     def has_poses(self) -> bool:
-        """True of a motion whose channels are those of the skeleton."""
+        """True of a motion with the channels of its skeleton."""
         return self.role == "motion" and self.channels is None
 
     @property
@@ -206,7 +210,7 @@ class Signal:
         return grid_blocks(self.n_rows, self.grids, self.grid_changes)
 
     def cut(self, start: int, stop: int) -> Signal:
-        """Frames start <= f < stop alone, with the grids that are in force there."""
+        """Keep frames start <= f < stop, with the grids in force there."""
         first, last = start * self.samples_per_frame, stop * self.samples_per_frame
         grids, changes = list(self.grids), []
         for row, channel, grid in sorted(self.grid_changes, key=itemgetter(0)):
@@ -231,11 +235,11 @@ class Signal:
         )
 
     def of_columns(self, columns: Sequence[int]) -> Signal:
-        """These columns alone, in the order given, each once, with their grids and their masks."""
+        """Keep these columns, in the order given, each once, with their grids and masks."""
         chosen = np.array(columns, np.int64)
-        at = np.full(self.n_channels, -1, np.int64)
-        at[chosen] = np.arange(len(chosen))
-        given = self.channels
+        new_columns = np.full(self.n_channels, -1, np.int64)
+        new_columns[chosen] = np.arange(len(chosen))
+        channels = self.channels
         scaling = self.scaling
         if scaling is not None:
             scaling = replace(
@@ -246,37 +250,37 @@ class Signal:
             values=np.ascontiguousarray(self.values[:, chosen]),
             grids=tuple(self.grids[column] for column in chosen),
             mask=None if self.mask is None else np.ascontiguousarray(self.mask[:, chosen]),
-            exceptions=self.exceptions.moved(at),
+            exceptions=self.exceptions.moved(new_columns),
             grid_changes=tuple(
-                (row, int(at[column]), grid)
+                (row, int(new_columns[column]), grid)
                 for row, column, grid in self.grid_changes
-                if at[column] >= 0
+                if new_columns[column] >= 0
             ),
-            channels=None if given is None else tuple(given[column] for column in chosen),
+            channels=None if channels is None else tuple(channels[column] for column in chosen),
             ordinals=None if self.ordinals is None else self.ordinals[:, chosen],
             scaling=scaling,
             stored=np.ascontiguousarray(self.stored[:, chosen]),
         )
 
     def in_units(self, scaling: Scaling | None) -> Signal:
-        """The same with ``values`` that mean what ``scaling`` says of the stored numbers."""
+        """The same with ``values`` in units, scaled from the stored numbers."""
         if scaling is None:
             return self
         values = scaling.values(self.stored)
         return replace(self, values=values, stored=self.stored, scaling=scaling)
 
     def as_stored(self) -> Signal:
-        """The same with the stored numbers as its values: what codecs and formats want."""
+        """The same with the stored numbers as its values, for codecs and formats."""
         if self.scaling is None:
             return self
         stored = self.scaling.stored(self.values, self.stored)
         return replace(self, values=stored, stored=stored, scaling=None)
 
     def to_ordinals(self) -> tuple[Ints, Bools]:
-        """The ordinal of every value, and whether it gives exactly this value back.
+        """The ordinal of every value, and whether it restores exactly this value.
 
-        A binary grid has many NaNs, of which ``values`` shows only that they are NaN: where
-        ``ordinals`` are given and still mean the value that is there, they are taken.
+        A binary grid has many NaNs, which ``values`` does not distinguish: given ``ordinals`` are
+        used where they still have the present value.
         """
         if self.scaling is not None:
             return self.as_stored().to_ordinals()
@@ -286,19 +290,19 @@ class Signal:
         exact = np.empty(self.values.shape, np.bool_)
         for rows, columns, grid in self.grid_blocks():
             block = np.ascontiguousarray(self.values[rows][:, columns])
-            found, on_grid = grid.ordinals(block)
+            coded, on_grid = grid.ordinals(block)
             if self.ordinals is not None:
                 given = np.ascontiguousarray(self.ordinals[rows][:, columns])
-                meant = grid.values(given)
-                same = (meant.view(np.int64) == block.view(np.int64)) | (
-                    np.isnan(meant) & np.isnan(block)
+                meaning = grid.values(given)
+                equal = (meaning.view(np.int64) == block.view(np.int64)) | (
+                    np.isnan(meaning) & np.isnan(block)
                 )
-                found, on_grid = np.where(same, given, found), on_grid | same
-            ordinals[rows, columns], exact[rows, columns] = found, on_grid
+                coded, on_grid = (np.where(equal, given, coded), on_grid | equal)
+            ordinals[rows, columns], exact[rows, columns] = coded, on_grid
         return ordinals, exact
 
     def masked(self) -> Values:
-        """The values with NaN where the mask says invalid."""
+        """The values, NaN where the mask is False."""
         if self.mask is None:
             return self.values
         return np.where(self.mask, self.values, np.nan)

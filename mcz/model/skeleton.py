@@ -112,7 +112,7 @@ HANDS = ("", "right", "left")
 
 
 def column_of(axis: str) -> int:
-    """The column of an axis, whatever its sign.
+    """The column of an axis of either sign.
 
     >>> column_of("z"), column_of("-y")
     (2, 1)
@@ -121,7 +121,7 @@ def column_of(axis: str) -> int:
 
 
 def signs_of(axis: str) -> Floats:
-    """Signs of x, y and z that make an axis positive, by half a turn about the one before it.
+    """Signs of x, y and z that make an axis positive, by half a turn about the previous one.
 
     >>> signs_of("z").tolist(), signs_of("-z").tolist()
     ([1.0, 1.0, 1.0], [-1.0, 1.0, -1.0])
@@ -243,11 +243,11 @@ class Skeleton:
         return [0, *accumulate(len(joint.channels) for joint in self.joints)]  # SKEL-06
 
     def addresses(self) -> list[str]:
-        """The name of every joint, made unique: ``name#n`` from the second of a name on."""
-        seen: dict[str, int] = {}
+        """The name of every joint, made unique: ``name#n`` for repeated ones."""
+        counts: dict[str, int] = {}
         names = []
         for joint in self.joints:
-            seen[joint.name] = n = seen.get(joint.name, -1) + 1
+            counts[joint.name] = n = counts.get(joint.name, -1) + 1
             names.append(joint.name if n == 0 else f"{joint.name}#{n}")
         return names
 
@@ -275,14 +275,14 @@ class Skeleton:
 def first_columns(
     channels: Sequence[Channel], kinds: tuple[str, ...], start: int = 0
 ) -> tuple[int, ...]:
-    """The columns of kinds that turn a joint together, () where one of them is missing.
+    """The columns of kinds that turn a joint together, () if one of them is missing.
 
-    Of each kind it is the first channel; ``start`` is the column of the joint's first.
+    The first channel of each kind counts; ``start`` is the first column of the joint.
     """
-    own = [channel.kind for channel in channels]
-    if not set(kinds) <= set(own):
+    channel_kinds = [channel.kind for channel in channels]
+    if not set(kinds) <= set(channel_kinds):
         return ()
-    return tuple(start + own.index(kind) for kind in kinds)
+    return tuple(start + channel_kinds.index(kind) for kind in kinds)
 
 
 Chosen = Sequence[int | str] | int | str
@@ -290,7 +290,7 @@ Joints = Chosen | None  # None: all
 
 
 def joint_list(joints: Chosen) -> Sequence[int | str]:
-    """Joints as a sequence; a single one may be given by itself."""
+    """Joints as a sequence, also from a single one."""
     return (joints,) if isinstance(joints, (int, np.integer, str)) else joints
 
 

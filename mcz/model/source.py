@@ -11,13 +11,13 @@ from mcz.model.checks import DATA, HASH, INTEGER, TEXT, Rule, check_fields
 
 
 class FrameNotes(Protocol):
-    """Notes of a source on each frame beside its values; a source format defines them."""
+    """Notes of a source on each frame, other than its values; a source format defines them."""
 
     def cut(self, start: int, stop: int) -> bytes:
-        """The notes of frames start <= f < stop as bytes of a segment, b"" where all is usual."""
+        """The notes of frames start <= f < stop as bytes of a segment, b"" if there are none."""
 
     def part(self, start: int, stop: int) -> FrameNotes:
-        """The notes of frames start <= f < stop alone, numbered from 0."""
+        """The notes of frames start <= f < stop, numbered from 0."""
 
 
 SOURCE = {
@@ -33,10 +33,10 @@ SOURCE = {
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Data, beside the values, to restore a source file byte for byte.
+    """Data, other than the values, to restore a source file byte for byte.
 
-    ``template`` is shared by clips that were printed alike; ``detail`` belongs to this clip;
-    ``notes`` holds what is said frame by frame. All three are defined by the source format.
+    ``template`` is shared by clips of the same layout; ``detail`` belongs to this clip; ``notes``
+    holds notes on single frames. The source format defines all three.
     """
 
     format: str
@@ -55,10 +55,10 @@ class Source:
             raise MotionError(f"source: size is {self.size}")
 
     def of_no_file(self) -> Source:
-        """The same for other values or frames than its file had: without size and hash."""
+        """The same for changed values or frames: without size and hash."""
         return replace(self, size=0, sha256=b"")
 
     def cut(self, start: int, stop: int) -> Source:
-        """The source of frames start <= f < stop alone."""
+        """The source of frames start <= f < stop."""
         notes = self.notes and self.notes.part(start, stop)
         return replace(self, notes=notes).of_no_file()

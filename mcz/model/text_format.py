@@ -1,4 +1,4 @@
-"""Representations that fit on a screen, however much a thing holds."""
+"""Representations of bounded length."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Any
 
 WIDEST = 60  # characters of a name
 MOST_LISTED = 40  # names in a message
-ODD = re.compile(r"[^ -~]")  # what is looked at more closely; all else is plain
+ODD = re.compile(r"[^ -~]")  # characters that need a closer look; all others are plain
 _FORMULA = re.compile(r"'*\s*[=+\-@\uff1d\uff0b\uff0d\uff20]|'*[\t\r\n]")
 _NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?", re.ASCII)
-NEAR = 0.6  # of 1, how alike a suggested name is
+NEAR = 0.6  # of 1: similarity of a suggested name
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, WIDEST, 160
 _SHORT.maxtuple = _SHORT.maxlist = _SHORT.maxdict = 3
@@ -30,10 +30,10 @@ def shown(name: str) -> str:
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""``text`` with characters escaped that are not seen, such as controls, but for ``kept``.
+    r"""``text`` with invisible characters escaped, except those in ``kept``.
 
-    These are control characters (C0, C1), those that turn the direction of text, line ends of all
-    sorts and blanks but the usual one.
+    They are control characters (C0, C1), characters that turn the direction of text, line ends of
+    all sorts and unusual blanks.
 
     >>> print(printable("a\x1b[2Jb"), printable("a\u202eb"), printable("V\xe4sa"))
     a\x1b[2Jb a\u202eb Väsa
@@ -47,7 +47,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def spreadsheet_cell(text: str) -> str:
-    """``text`` as a cell of CSV that no spreadsheet takes for a formula; see ``cell_text``.
+    """``text`` as a cell of CSV that spreadsheets do not run as a formula; see ``cell_text``.
 
     >>> [spreadsheet_cell(text) for text in ("=1+2", "'@a", "-5", "a=b")]
     ["'=1+2", "''@a", '-5', 'a=b']
@@ -56,7 +56,7 @@ def spreadsheet_cell(text: str) -> str:
 
 
 def cell_text(cell: str) -> str:
-    """The text that ``spreadsheet_cell`` made a cell of."""
+    """The inverse of ``spreadsheet_cell``."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
@@ -78,7 +78,7 @@ def first_of(names: Sequence[str], most: int) -> str:
 
 
 def among(names: Sequence[str], missed: object) -> str:
-    """Names as a message lists them, and which of them are like the one that was ``missed``.
+    """Names for a message, and those that resemble ``missed``.
 
     >>> among(["hips", "head"], "haed")
     "hips, head; did you mean 'head'?"
@@ -90,18 +90,18 @@ def among(names: Sequence[str], missed: object) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """The names most like ``name``, as a message has them; "" where none is."""
+    """The names most like ``name``, for a message; "" if there are none."""
     from difflib import get_close_matches
 
     by_lower: dict[str, str] = {}
     for one in known:
         by_lower.setdefault(one.lower(), one)
-    found = get_close_matches(name.lower(), list(by_lower), 3, NEAR)
-    return " or ".join(repr(by_lower[one]) for one in found)
+    matches = get_close_matches(name.lower(), list(by_lower), 3, NEAR)
+    return " or ".join(repr(by_lower[one]) for one in matches)
 
 
 def brief(thing: Any) -> str:
-    """A dataclass as its fields, of long ones the first items and how many there are."""
+    """A dataclass as its fields, of long ones the first items and their number."""
     parts = (f"{f.name}={_value(getattr(thing, f.name))}" for f in fields(thing) if f.repr)
     return f"{type(thing).__name__}({', '.join(parts)})"
 
@@ -120,9 +120,9 @@ def _value(value: Any) -> str:
 def skeleton_text(skeleton: Any) -> str:
     known = skeleton.unit_cm is not None
     unit = f"1 unit = {skeleton.unit_cm:.6g} cm" if known else "unit unknown"
-    held = f"{counted(skeleton.n_joints, 'joint')}, {counted(skeleton.n_channels, 'channel')}"
-    up = f", {skeleton.up_axis} up" if skeleton.up_axis else ""
-    return f"<Skeleton {shown(skeleton.name)}: {held}, {unit}{up}>"
+    counts = f"{counted(skeleton.n_joints, 'joint')}, {counted(skeleton.n_channels, 'channel')}"
+    up_axis = f", {skeleton.up_axis} up" if skeleton.up_axis else ""
+    return f"<Skeleton {shown(skeleton.name)}: {counts}, {unit}{up_axis}>"
 
 
 def source_text(source: Any) -> str:
@@ -140,20 +140,20 @@ def exceptions_text(exceptions: Any) -> str:
 
 
 def signal_text(signal: Any) -> str:
-    held = [counted(signal.n_frames, "frame"), counted(signal.n_channels, "channel")]
+    parts = [counted(signal.n_frames, "frame"), counted(signal.n_channels, "channel")]
     if signal.samples_per_frame > 1:
-        held.append(f"{signal.samples_per_frame} rows a frame")
+        parts.append(f"{signal.samples_per_frame} rows a frame")
     if signal.mask is not None and not signal.mask.all():
-        held.append(f"{counted(int((~signal.mask).sum()), 'value')} invalid")
-    return f"<Signal {shown(signal.name)}: {', '.join(held)}>"
+        parts.append(f"{counted(int((~signal.mask).sum()), 'value')} invalid")
+    return f"<Signal {shown(signal.name)}: {', '.join(parts)}>"
 
 
 def motion_text(motion: Any) -> str:
     known = motion.frame_rate is not None
     rate = f"{float(motion.frame_rate):g} Hz" if known else "an unknown rate"
-    held = [counted(motion.skeleton.n_joints, "joint")]
-    held.append(counted(motion.signals[0].n_channels, "channel"))
+    parts = [counted(motion.skeleton.n_joints, "joint")]
+    parts.append(counted(motion.signals[0].n_channels, "channel"))
     if len(motion.signals) > 1:
-        held.append(counted(len(motion.signals), "signal"))
+        parts.append(counted(len(motion.signals), "signal"))
     frames = counted(motion.n_frames, "frame")
-    return f"<Motion {shown(motion.name)}: {frames} at {rate}, {', '.join(held)}>"
+    return f"<Motion {shown(motion.name)}: {frames} at {rate}, {', '.join(parts)}>"

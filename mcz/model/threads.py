@@ -1,7 +1,7 @@
 """Numbers of threads that work on a file, and the work that they share.
 
-Compiled loops and hashes let other threads run, so segments that need nothing of each other are
-decoded and coded at once. What comes out does not depend on the number.
+Compiled loops and hashes release the interpreter lock, so independent segments are decoded and
+coded in parallel. The result does not depend on the number.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from mcz.errors import OptionError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-WORTH = 0.01  # seconds of work that threads are started for
+LEAST_PARALLEL_SECONDS = 0.01  # seconds: work that takes less is done in one thread
 
-_PACES: dict[str, float] = {}  # seconds for one of an amount, the last time, by the kind of work
+_PACES: dict[str, float] = {}  # last measured seconds for one unit of amount, by the kind of work
 _LIMIT: ContextVar[int | None] = ContextVar("threads", default=None)
 
 
-def in_force() -> int:
+def thread_limit() -> int:
     """Number of threads that a call may use: by default one a processor."""
     return _LIMIT.get() or processors()
 
@@ -38,41 +38,41 @@ def processors() -> int:
 
 
 @contextmanager
-def limited(threads: int | None) -> Iterator[None]:
-    """Let what is called meanwhile use so many threads; None: as many as before."""
-    token = _LIMIT.set(checked(threads) or _LIMIT.get())
+def limit_threads(threads: int | None) -> Iterator[None]:
+    """Limit the threads of calls within the block; None: keep the present limit."""
+    token = _LIMIT.set(check_threads(threads) or _LIMIT.get())
     try:
         yield
     finally:
         _LIMIT.reset(token)
 
 
-def checked(threads: int | None) -> int | None:
-    """The same number; raises OptionError for one below 1."""
+def check_threads(threads: int | None) -> int | None:
+    """Return ``threads``; raises OptionError for a number below 1."""
     if threads is not None and threads < 1:
         raise OptionError(f"threads: {threads}, not at least 1")
     return threads
 
 
 @contextmanager
-def timed(kind: str, amount: int) -> Iterator[None]:
-    """Note how long work of some kind takes."""
+def timing(kind: str, amount: int) -> Iterator[None]:
+    """Measure how long work of some kind takes."""
     start = perf_counter()
     yield
     _PACES[kind] = (perf_counter() - start) / max(amount, 1)
 
 
-def worthwhile(kind: str, amount: int, threads: int) -> int:
-    """``threads``, or 1 where so much work of this kind is done as soon as they are started."""
-    return threads if _PACES.get(kind, inf) * amount >= WORTH else 1
+def useful_threads(kind: str, amount: int, threads: int) -> int:
+    """``threads``, or 1 where this work takes less than ``LEAST_PARALLEL_SECONDS``."""
+    return threads if _PACES.get(kind, inf) * amount >= LEAST_PARALLEL_SECONDS else 1
 
 
-def in_order(
+def map_in_order(
     function: Callable[[Item], Result], items: Sequence[Item], threads: int
 ) -> Iterator[Result]:
-    """``function`` of each item, in order; few results wait, so that memory is bounded.
+    """Map ``function`` over the items, in order; few results wait, so that memory is bounded.
 
-    The thread that asks takes one of as many items as there are threads.
+    The calling thread computes one of every ``threads`` items.
     """
     if threads < 2 or len(items) < 2:
         yield from map(function, items)
@@ -81,11 +81,11 @@ def in_order(
 
     with ThreadPoolExecutor(threads - 1) as pool:
         for first in range(0, len(items), threads):
-            others = [pool.submit(function, item) for item in items[first + 1 : first + threads]]
+            futures = [pool.submit(function, item) for item in items[first + 1 : first + threads]]
             try:
                 yield function(items[first])
-                for other in others:
-                    yield other.result()
+                for future in futures:
+                    yield future.result()
             finally:
-                for other in others:
-                    other.cancel()
+                for future in futures:
+                    future.cancel()

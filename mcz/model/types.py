@@ -19,19 +19,19 @@ Values: TypeAlias = NDArray[np.float64 | np.int64]
 """Values of a signal: binary64, or int64 where grids are of integers."""
 
 Reals: TypeAlias = NDArray[np.floating]
-"""Poses and places as float64 or float32, as a caller asks for them."""
+"""Poses and positions as float64 or float32, as the caller chooses."""
 
 Params: TypeAlias = Mapping[str, Any]
-"""Parameters of a codec by name; its table of parameters has the type of each."""
+"""Parameters of a codec by name; its table of parameters has their types."""
 
 JsonObject: TypeAlias = dict[str, Any]
-"""An object of JSON, as ``--json`` prints it."""
+"""An object of JSON, as printed by ``--json``."""
 
 Settings: TypeAlias = dict[str, Any]
-"""Parameters or options by name, as they are put together."""
+"""Parameters or options by name, while they are collected."""
 
 Progress: TypeAlias = Callable[[int, int, str], None]
-"""A listener to long work: what is done, of how much, and a name."""
+"""A listener to long work: amount done, total, and a name."""
 
 Target: TypeAlias = str | PathLike[str] | bytes | BinaryIO
-"""A file: a path, an address that fsspec knows, its bytes, or a stream."""
+"""A file: a path, an address for fsspec, its bytes, or a stream."""

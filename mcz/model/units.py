@@ -18,7 +18,7 @@ LEAST_CM, MOST_CM = 1e-6, 1e9
 
 
 def unit_cm_of(unit: str) -> float:
-    """Centimeters of a length unit, a key of ``UNIT_CM``, or so many of one; raises OptionError.
+    """Centimeters of a length unit, a key of ``UNIT_CM``, or of a multiple; raises OptionError.
 
     >>> unit_cm_of("in"), unit_cm_of("5.6444cm")
     (2.54, 5.6444)
@@ -27,14 +27,14 @@ def unit_cm_of(unit: str) -> float:
     if not match or match[2] not in UNIT_CM or match[1] == ".":
         names = ", ".join(UNIT_CM)
         raise OptionError(f"unit {unit!r} is not one of {names}, nor a length such as 5.6444cm")
-    found = float(Fraction(match[1] or 1) * Fraction(str(UNIT_CM[match[2]])))
-    if not LEAST_CM <= found <= MOST_CM:
+    size = float(Fraction(match[1] or 1) * Fraction(str(UNIT_CM[match[2]])))
+    if not LEAST_CM <= size <= MOST_CM:
         raise OptionError(f"unit {unit!r} is not between {LEAST_CM:g} and {MOST_CM:g} cm")
-    return found
+    return size
 
 
 def in_unit(skeleton: Skeleton, unit: str | None) -> Skeleton:
-    """``skeleton`` in the length unit of that name, None: as it is; raises OptionError."""
+    """``skeleton`` in the named length unit, unchanged for None; raises OptionError."""
     return skeleton if unit is None else replace(skeleton, unit_cm=unit_cm_of(unit))
 
 
@@ -46,17 +46,17 @@ def axes_of(skeleton: Skeleton) -> tuple[str, str, str]:
 def facing(
     skeleton: Skeleton, up: str | None, forward: str | None = None, handedness: str | None = None
 ) -> Skeleton:
-    """``skeleton`` with these axes and handedness, None: as they are; raises OptionError.
+    """``skeleton`` with these axes and handedness, unchanged for None; raises OptionError.
 
-    Where they are others than before, it is no longer the skeleton of its own source file.
+    With other axes than before, it is no longer the skeleton of its own source file.
     """
-    for what, axis in (("up", up), ("forward", forward)):
+    for word, axis in (("up", up), ("forward", forward)):
         if axis is not None and axis.removeprefix("+") not in AXES[1:]:
-            raise OptionError(f"{what} axis {axis!r} is not one of {', '.join(AXES[1:])}")
+            raise OptionError(f"{word} axis {axis!r} is not one of {', '.join(AXES[1:])}")
     if handedness not in (None, *HANDS[1:]):
         raise OptionError(f"handedness {handedness!r} is neither right nor left")
     try:
-        found = replace(
+        result = replace(
             skeleton,
             up_axis=up or skeleton.up_axis,
             forward_axis=forward or skeleton.forward_axis,
@@ -64,32 +64,34 @@ def facing(
         )
     except MotionError as error:  # parallel axes
         raise OptionError(str(error)) from None
-    return skeleton if axes_of(found) == axes_of(skeleton) else replace(found, source=None)
+    return skeleton if axes_of(result) == axes_of(skeleton) else replace(result, source=None)
 
 
 def _quantities() -> dict[str, tuple[str, float]]:
-    """Units of physical quantities -> what they measure, and how much of it."""
-    found = {unit: ("length", size / 100) for unit, size in UNIT_CM.items()}
-    found |= {"deg": ("angle", math.pi / 180), "°": ("angle", math.pi / 180), "rad": ("angle", 1.0)}
-    found |= {"Nmm": ("moment", 1e-3), "Ncm": ("moment", 1e-2), "nt": ("N", 1.0)}
-    found |= {"ntmm": ("moment", 1e-3), "g": ("acceleration", 9.80665), "m/s2": ("acceleration", 1)}
+    """Units of physical quantities -> (quantity, size)."""
+    units = {unit: ("length", size / 100) for unit, size in UNIT_CM.items()}
+    units |= {"deg": ("angle", math.pi / 180), "°": ("angle", math.pi / 180), "rad": ("angle", 1.0)}
+    units |= {"Nmm": ("moment", 1e-3), "Ncm": ("moment", 1e-2), "nt": ("N", 1.0)}
+    units |= {"ntmm": ("moment", 1e-3), "g": ("acceleration", 9.80665), "m/s2": ("acceleration", 1)}
     prefixes = {"": 1.0, "k": 1e3, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}
     for base in ("V", "N", "Nm", "W", "Pa", "Hz", "s"):
-        found |= {p + base: ("moment" if base == "Nm" else base, f) for p, f in prefixes.items()}
-    return found
+        units |= {p + base: ("moment" if base == "Nm" else base, f) for p, f in prefixes.items()}
+    return units
 
 
 _QUANTITIES = _quantities()
 
 
 def unit_ratio(unit: str, other: str) -> float | None:
-    """The size of ``unit`` in ``other``; None where they do not measure the same.
+    """The size of ``unit`` in ``other``; None if they measure different quantities.
 
     >>> unit_ratio("mV", "V"), unit_ratio("N.m", "Nmm"), unit_ratio("mV", "N")
     (0.001, 1000.0, None)
     """
-    plain, wanted = (re.sub(r"[\s.*·]", "", text) for text in (unit, other))
-    if plain == wanted:
+    plain_unit, other_unit = (re.sub(r"[\s.*·]", "", text) for text in (unit, other))
+    if plain_unit == other_unit:
         return 1.0
-    (what, size), (same, whole) = (_QUANTITIES.get(u, (u, 1.0)) for u in (plain, wanted))
-    return size / whole if what == same else None
+    (quantity, size), (other_quantity, whole) = (
+        _QUANTITIES.get(u, (u, 1.0)) for u in (plain_unit, other_unit)
+    )
+    return size / whole if quantity == other_quantity else None

@@ -3,5 +3,5 @@
 ``viewing`` serves and builds the page of ``tools/viewer``, ``pictures`` draws with matplotlib,
 ``rerun`` logs to Rerun.
 
-Imports ``mcz.files`` and the rooms below it.
+Imports ``mcz.files`` and the folders below it.
 """

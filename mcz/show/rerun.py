@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rerun.blueprint import Horizontal
 
 APPLICATION = "mcz"
-BLOCK = 2**19  # numbers that are worked on at a time: what bounds the memory
+BLOCK = 2**19  # numbers a block, which bounds the memory
 SIDES = {
     MIDDLE: ("middle", (190, 190, 190)),
     LEFT: ("left", (86, 156, 214)),
@@ -45,12 +45,12 @@ def to_rerun(
     ``mcz.point_names``, ``bones/left``, ``right`` and ``middle`` as lines, and every plain scalar
     and every channel of another signal as a time series ``SIGNAL/NAME``; events as texts. Lengths
     are in meters where the unit is known. The timeline ``frame`` has the source's frame numbers,
-    ``time`` the times of ``mcz.times``, where they are known. What is missing is absent. Positions
+    ``time`` the times of ``mcz.times``, where they are known. Missing values are absent. Positions
     are binary32, scalars binary64.
 
-    Without ``recording`` a new one is made, which holds all until it has a sink; with one that has
-    (``save``, ``spawn``) memory is bounded. Returns the recording. Raises MotionError where there
-    is nothing to log.
+    Without ``recording`` a new one is created, which keeps all data until it has a sink; with one
+    that has (``save``, ``spawn``) memory is bounded. Returns the recording. Raises MotionError if
+    there is nothing to log.
     """
     rerun = import_extra("rerun", "rerun")
     if recording is None:
@@ -60,9 +60,9 @@ def to_rerun(
 
 
 def view_of(moving: MotionLike, entity: str) -> Horizontal:
-    """Blueprint of the rerun viewer for ``to_rerun``: a figure, and curves beside it.
+    """Blueprint of the rerun viewer for ``to_rerun``: a figure, and curves next to it.
 
-    Residuals are there, and not shown: there are as many as points.
+    Residuals are logged, but not shown: there are as many as points.
     """
     blueprint = import_extra("rerun.blueprint", "rerun")
     log = _Log(import_extra("rerun", "rerun"), None, moving, entity)
@@ -79,8 +79,6 @@ def view_of(moving: MotionLike, entity: str) -> Horizontal:
 
 
 class _Log:
-    """One motion on its way into a recording."""
-
     def __init__(self, rerun: ModuleType, recording: Any, moving: MotionLike, entity: str) -> None:
         self.rerun, self.recording, self.moving = rerun, recording, moving
         self.parts = [part for part in entity.split("/") if part] or ["motion"]
@@ -117,7 +115,7 @@ class _Log:
         self.rerun.send_columns(path, times, columns, recording=self.recording)
 
     def _still(self) -> None:
-        """Log what is constant: axes, names, colors, events."""
+        """Log constants: axes, names, colors, events."""
         rerun, log = self.rerun, self.recording.log
         skeleton = self.moving.skeleton
         if up := skeleton.up_axis:
@@ -143,11 +141,11 @@ class _Log:
 
     def _events(self) -> None:
         moving = self.moving
-        told = moving.recording if isinstance(moving, Clip) else recording_of(_motion(moving))
-        if told is None or not told.events:
+        recorded = moving.recording if isinstance(moving, Clip) else recording_of(_motion(moving))
+        if recorded is None or not recorded.events:
             return
-        texts = [" ".join(filter(None, (e.context, e.label))) for e in told.events]
-        times = [self.rerun.TimeColumn("time", duration=[event.time for event in told.events])]
+        texts = [" ".join(filter(None, (e.context, e.label))) for e in recorded.events]
+        times = [self.rerun.TimeColumn("time", duration=[event.time for event in recorded.events])]
         columns = self.rerun.TextLog.columns(text=texts)
         self.rerun.send_columns(str(self.path("events")), times, columns, recording=self.recording)
 
@@ -163,7 +161,7 @@ class _Log:
                 self._send(self.path(signal, name), start, stop, per_frame, parts)
 
     def _places(self, start: int, stop: int, nodes: Floats) -> None:
-        """Points and bones of some frames; ``nodes`` (n_frames, n_nodes, 3), NaN where unknown."""
+        """Log points and bones; ``nodes`` (n_frames, n_nodes, 3), NaN where unknown."""
         figure, rerun = self.figure, self.rerun
         assert figure is not None
         for name, node in zip(figure.names, figure.points, strict=True):
@@ -198,13 +196,12 @@ class _Figure:
         self.bones = {s: self.body.bones[of_bones == s] for s in SIDES if (of_bones == s).any()}
 
     def places(self, moving: MotionLike, start: int, stop: int) -> Floats:
-        """Places of the nodes, (n_frames, n_nodes, 3), NaN where unknown."""
+        """Positions of the nodes, (n_frames, n_nodes, 3), NaN where unknown."""
         values = values_of(moving, (start, stop), range(moving.skeleton.n_joints))
         return self.body.places(values) * self.scale
 
 
 def _figure_of(moving: MotionLike) -> _Figure | None:
-    """None where the skeleton has no kinematics."""
     if not moving.signals[0].has_poses or not moving.skeleton.joints:
         return None
     try:
@@ -244,7 +241,6 @@ def _samples(moving: MotionLike, index: int, start: int, stop: int) -> NDArray[n
 
 
 def _numbers(moving: MotionLike) -> NDArray[np.int64]:
-    """The source's numbers of all frames."""
     numbers = moving.frame_numbers if isinstance(moving, Clip) else _motion(moving).frame_numbers
     return numbers_or_rows(numbers, moving.n_frames)
 

@@ -16,11 +16,9 @@ from mcz.kernels import SPARE
 from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind, print_values, scan
-from mcz.model.types import Values
+from mcz.model.types import Ints, Values
 from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, parse_layout
 from mcz.sources.text.notes import RowNotes
-
-Ints = NDArray[np.int64]
 
 TEXT_LIMIT = 2**26  # bytes that any text may have
 TEXT_PER_CELL = 512  # bytes a cell of a larger text, with one more row and channel
@@ -30,8 +28,8 @@ TEXT_PER_SIZE = 4  # most bytes of a larger text, as a multiple of the source fi
 def restore(motion: Motion, source: Source) -> bytes:
     """The text that ``source`` and the values of ``motion`` make.
 
-    Rows beyond the notes are laid out as usual. A value that its grid does not have is printed as
-    the nearest number of the grid.
+    Rows after the last note use pattern 0. A value that its grid does not have is printed as the
+    nearest number of the grid.
 
     Raises FormatError where the source does not belong to such a motion, and LimitError for a text
     that is larger than the limits above.
@@ -41,7 +39,7 @@ def restore(motion: Motion, source: Source) -> bytes:
     limit = text_limit(source, [(signal.n_rows, signal.n_channels)])
     notes = source.notes if isinstance(source.notes, RowNotes) else None
     runs = pattern_runs(layout, notes, signal.n_rows)
-    if any_numbers(runs) and signal.samples_per_frame != 1:  # AMC-08
+    if prints_frame_numbers(runs) and signal.samples_per_frame != 1:  # AMC-08
         raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
     rows = rows_text(
         signal, layout, notes, numbers_or_rows(motion.frame_numbers, signal.n_rows), limit
@@ -77,7 +75,7 @@ def rows_text(
     invalid, None where that does not matter. Raises as ``restore`` does.
     """
     runs = pattern_runs(layout, notes, signal.n_rows)
-    numbered = any_numbers(runs)
+    numbered = prints_frame_numbers(runs)
     cells = Cells(signal, numbers if numbered else None)
     if numbered and notes is not None:
         texts = [entry for entry in notes.texts if entry[0] < signal.n_rows]  # AMC-06
@@ -88,7 +86,7 @@ def rows_text(
     return _body(cells, runs, limit, layout.ending)
 
 
-def any_numbers(runs: Sequence[tuple[Pattern, int, int]]) -> bool:
+def prints_frame_numbers(runs: Sequence[tuple[Pattern, int, int]]) -> bool:
     """Return True if rows print their frame number."""
     return any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
 
@@ -97,15 +95,17 @@ def pattern_runs(
     layout: Layout, notes: RowNotes | None, n_rows: int
 ) -> list[tuple[Pattern, int, int]]:
     """(pattern, start, stop) of each run of rows."""
-    numbers = np.zeros(n_rows, np.int64)
+    indices = np.zeros(n_rows, np.int64)
     if notes is not None:
-        numbers[: len(notes.patterns)] = notes.patterns[:n_rows]
+        indices[: len(notes.patterns)] = notes.patterns[:n_rows]
     if not n_rows:
         return []
-    if numbers.max() >= len(layout.patterns):  # AMC-03
-        raise FormatError(f"source notes: pattern {numbers.max()} of {len(layout.patterns)}")
-    edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), n_rows]
-    return [(layout.patterns[numbers[a]], a, b) for a, b in pairwise(edges)]
+    if indices.max() >= len(layout.patterns):  # AMC-03
+        raise FormatError(
+            f"source notes: pattern {indices.max()}, but there are {len(layout.patterns)}"
+        )
+    edges = [0, *(np.flatnonzero(np.diff(indices)) + 1).tolist(), n_rows]
+    return [(layout.patterns[indices[a]], a, b) for a, b in pairwise(edges)]
 
 
 def _body(
@@ -150,7 +150,8 @@ class Cells:
     """Token (row, column) is ``texts[start[row, column]:][:size[row, column]]``.
 
     ``start`` and ``size`` have shape (n_rows, n_channels + 1); the last column holds the frame
-    numbers, if any. Raises FormatError for an exception that is no number or lies outside.
+    numbers, if any. Raises FormatError for an odd token that is not a number, or lies outside the
+    signal.
     """
 
     def __init__(self, signal: Signal, numbers: Ints | None) -> None:
@@ -160,7 +161,7 @@ class Cells:
         self._pieces: list[Bytes] = []
         self._total = 0
         step = max(1, BLOCK // max(1, n_columns))
-        for first, last, grids in _by_rows(signal):
+        for first, last, grids in _grid_runs(signal):
             for row in range(first, last, step):
                 self._print_rows(signal.values, slice(row, min(row + step, last)), grids)
         self._print_exceptions(signal)
@@ -172,7 +173,7 @@ class Cells:
 
     def texts(self) -> Bytes:
         texts = np.concatenate([*self._pieces, np.zeros(SPARE, np.uint8)])
-        texts.flags.writeable = False  # nobody writes to it
+        texts.flags.writeable = False  # the frozen copy is final
         return texts
 
     def set(self, rows: Ints, columns: Ints, texts: Sequence[bytes]) -> None:
@@ -196,19 +197,19 @@ class Cells:
         self._total += len(buffer)
 
     def _print_rows(self, values: Values, rows: slice, grids: Sequence[Grid]) -> None:
-        """Print rows of one grid a column, those of decimal grids at once."""
+        """Print rows in which each column has one grid; first all columns of decimal grids."""
         values, size = values[rows], self.size[rows]
         self._append(print_values(values, grids, self._total, self.start[rows], size))
         if size[:, :-1].all():
             return
         row, column = np.nonzero(size[:, :-1] == 0)
         for grid in dict.fromkeys(grids[c] for c in np.flatnonzero(np.bincount(column)).tolist()):
-            mine = np.array([known == grid for known in grids])[column]
-            own_row, own_column = row[mine], column[mine]
+            has_grid = np.array([known == grid for known in grids])[column]
+            own_row, own_column = row[has_grid], column[has_grid]
             self._print(grid, values[own_row, own_column], own_row + rows.start, own_column)
 
     def _print(self, grid: Grid, values: Values, rows: Ints, columns: Ints) -> None:
-        """Print values by the nearest number of their grid, by repr where they lie beyond it."""
+        """Print values by the nearest number of their grid; beyond its range, by repr."""
         if not grid.is_text:
             grid = SHORTEST  # GRID-07
         values = values.astype(np.float64, copy=False)
@@ -225,7 +226,7 @@ class Cells:
             self.set(rows[off], columns[off], [repr(v).encode() for v in values[off].tolist()])
 
     def _print_exceptions(self, signal: Signal) -> None:
-        """Print exceptions as they were where the value still is that of their text."""
+        """Print the stored text of an exception if its value is unchanged."""
         exceptions = signal.exceptions
         if not len(exceptions):
             return
@@ -243,7 +244,7 @@ class Cells:
         self.set(rows[kept], columns[kept], [exceptions.texts[k] for k in kept])
 
 
-def _by_rows(signal: Signal) -> Iterator[tuple[int, int, list[Grid]]]:
+def _grid_runs(signal: Signal) -> Iterator[tuple[int, int, list[Grid]]]:
     """Runs of rows in which no column changes its grid, with the grid of each column."""
     changes: dict[int, list[tuple[int, Grid]]] = {}
     for row, column, grid in signal.grid_changes:

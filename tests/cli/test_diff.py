@@ -368,4 +368,4 @@ def test_arrays_that_are_no_signals_are_compared(tmp_path: Path, call: Call) -> 
     for name, shape in (("a", 0.0), ("b", 1.0)):
         np.savez(tmp_path / f"{name}.npz", **arrays, betas=np.full(10, shape))
     code, out, _ = call("diff", tmp_path / "a.npz", tmp_path / "b.npz")
-    assert code == 0 and "arrays beside the signals: not the same" in out
+    assert code == 0 and "arrays other than the signals: not the same" in out

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mcz.codecs.posewave.choices import choose, choose_orders
-from mcz.codecs.posewave.header import parse_header
+from mcz.codecs.posewave.header import parse_posewave_header
 from mcz.codecs.posewave.orders import SEQUENCES, Orders
 from mcz.codecs.posewave.posewave import CODEC
 from mcz.codecs.posewave.segment import decode_segment, encode_segment
@@ -104,7 +104,7 @@ def test_codec() -> None:
     skeleton, values = turning_person()
     source = source_of(skeleton, values)
     choice = choose(source, PARAMETERS)
-    header = parse_header(choice.header, source.layout)
+    header = parse_posewave_header(choice.header, source.layout)
     assert header.orders
     streams, expected = encode_segment(header, skeleton, values, choice.weights)
     plain = replace(header, orders={})

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mcz.bench.cases import Case, Variant
-from mcz.bench.measure import point
+from mcz.bench.measure import measure
 from mcz.cli.common import run as run_command
 from mcz.codecs import codec_by_name
 from mcz.errors import OptionError
@@ -27,7 +27,7 @@ def test_a_figure_out_of_reach_is_told(case: Case, monkeypatch: pytest.MonkeyPat
     def of(case: Case, variant: Variant, params: dict[str, float], *, markers: bool) -> Any:
         return {"mse": min(50.0, 1 + params["T_g"])}
 
-    monkeypatch.setattr(at_figure, "point", of)
+    monkeypatch.setattr(at_figure, "measure", of)
     with pytest.raises(OptionError, match="mse 60 is not reached, 1 to 50 is"):
         at_figure.at_figure(case, Variant("mrdwt"), "mse", 60.0)
 
@@ -44,7 +44,7 @@ def test_all_tables_of_generated_clips(
         shutil.copy(samples / "walk.amc", tmp_path / f"{name}.amc")
 
     def near(case: Case, variant: Variant, key: str, wanted: float, hint: float) -> Any:
-        return point(
+        return measure(
             case, variant, {codec_by_name(variant.codec).dial.parameter: hint}, markers=False
         )
 

@@ -139,7 +139,7 @@ def test_a_source_that_changed_is_converted_anew(samples: Path, tmp_path: Path) 
 def test_what_is_below_a_folder_is_converted_anew(
     samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shelf_module, "REST", 0)
+    monkeypatch.setattr(shelf_module, "SCAN_FACTOR", 0)
     folder = tmp_path / "takes"
     (folder / "deep").mkdir(parents=True)
     source = folder / "deep" / "walk.bvh"

@@ -14,7 +14,7 @@ from mcz.codecs import ENTRIES
 from mcz.container import payloads
 from mcz.container.dictionary_deflate import decode_data
 from mcz.container.packets import FRAME, SEGMENT, Packet
-from mcz.container.segments import parse_header
+from mcz.container.segments import parse_segment_header
 from mcz.errors import MczError
 from mcz.model.schema import MAX_COUNT, build, parse
 from tools.fuzz.repair import (
@@ -129,7 +129,7 @@ class Mutation:
 
     def _head(self, payload: bytes) -> bytes:
         try:
-            header, _ = parse_header(payload)
+            header, _ = parse_segment_header(payload)
         except MczError:
             return self.change(payload, len(payload) + 16)
         name = self.rng.choice(("signal", "first", "n_frames", "lead", "tail", "flags"))
@@ -148,7 +148,7 @@ class Mutation:
             return None
         try:
             fields = parse(payloads.Cend, pieces[end].payload, "CEND")
-            last = parse_header(pieces[data[-1]].payload)[0]
+            last = parse_segment_header(pieces[data[-1]].payload)[0]
             more = self._near(last.n_frames) - last.n_frames
             changed = list(pieces)
             changed[data[-1]] = _edit_header(pieces[data[-1]], n_frames=last.n_frames + more)

@@ -34,7 +34,7 @@ from mcz.container.index import build_index
 from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet, implied_by
 from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
-from mcz.container.segments import SegmentHeader, mask_of, parse_header
+from mcz.container.segments import SegmentHeader, mask_of, parse_segment_header
 from mcz.container.source import open_source
 from mcz.container.value_hash import value_hash
 from mcz.errors import FormatError, MczError
@@ -117,7 +117,7 @@ def join_pieces(
 def _due(segment: bytes, due: int) -> int:
     """The frame of signal 0 that follows a segment."""
     try:
-        header, _ = parse_header(segment)
+        header, _ = parse_segment_header(segment)
     except FormatError:
         return due
     return due if header.signal else header.stop
@@ -206,7 +206,7 @@ class Table:
 def table_of(payload: bytes) -> Table | None:
     """The stream table of a segment, found by its crc; None where there is none."""
     try:
-        _, start = parse_header(payload)
+        _, start = parse_segment_header(payload)
     except FormatError:
         return None
     crc = zlib.crc32(payload[:start])
@@ -245,7 +245,7 @@ def with_streams(payload: bytes, table: Table, streams: Sequence[bytes]) -> byte
 
 def with_header(payload: bytes, **fields: int) -> bytes:
     """The segment with other ``fields`` of its SegmentHeader; its table's checksum is right."""
-    header, start = parse_header(payload)
+    header, start = parse_segment_header(payload)
     table = table_of(payload)
     new: SegmentHeader = replace(header, **fields)
     numbers = (new.signal, new.first, new.n_frames, new.lead, new.tail)

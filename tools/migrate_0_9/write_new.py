@@ -23,7 +23,7 @@ from mcz.container.writer import Writer
 from mcz.files.editing.unpacking import named_files
 from mcz.files.writing.clip_writer import write_clip, write_skeleton
 from mcz.files.writing.quality import CHUNK, quality_payload
-from mcz.model.clock import EXACT, Timeline, check_numbers, numbers_or_rows
+from mcz.model.clock import TOLERANCE, Timeline, check_numbers, numbers_or_rows
 from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
 
@@ -325,7 +325,7 @@ def differences(
 def _is_near(new: Timeline | None, was: Timeline) -> bool:
     if new is None:
         return False
-    return new.is_near(was) or bool(np.abs(new.times - was.times).max() <= was.rounding + EXACT)
+    return new.is_near(was) or bool(np.abs(new.times - was.times).max() <= was.rounding + TOLERANCE)
 
 
 def _of_clip(old: Old, clip: mcz.Clip, was: Content, moved: bool) -> Iterator[str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from mcz.bench.cases import Case, Variant
 from mcz.bench.ladder import MOST_TRIALS, Settings, dial_of
-from mcz.bench.measure import Record, point
+from mcz.bench.measure import Record, measure
 from mcz.errors import MotionError, OptionError
 
 NEAR, CLOSE = 0.002, 1.0005  # of a figure, and of settings: near enough
@@ -29,7 +29,7 @@ def at_figure(case: Case, variant: Variant, key: str, wanted: float, hint: float
     points: dict[float, Record] = {}
 
     def figure(setting: float) -> float:
-        found = point(case, variant, {dial.parameter: settings.given(setting)}, markers=False)
+        found = measure(case, variant, {dial.parameter: settings.given(setting)}, markers=False)
         points[setting] = found
         if found[key] is None:
             raise OptionError(f"{variant.label}: this clip has no {key}")

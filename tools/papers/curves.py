@@ -25,9 +25,9 @@ from mcz.bench.measure import (
     LEAST_SECONDS,
     MOST_RUNS,
     Record,
+    codec_calls,
+    coded_part,
     cpu_seconds,
-    what_is_coded,
-    work_of,
     write_file,
 )
 from mcz.codecs import codec_by_name
@@ -77,7 +77,7 @@ def point_of(loaded: Loaded, variant: Variant, params: Mapping[str, Any]) -> Rec
 
     Raises MotionError where the length unit is unknown.
     """
-    motion = what_is_coded(loaded.motion, variant.codec)
+    motion = coded_part(loaded.motion, variant.codec)
     data = write_file(motion, variant.codec, variant.options(params))
     with mcz.open(data, max_decoded=2**53) as file:
         clip = file.only_clip()
@@ -178,7 +178,7 @@ def speeds_beside(case: Case, settings: Sequence[tuple[Variant, float]]) -> list
     for variant, setting in settings:
         dial, given = dial_of(variant)
         params = variant.options({dial.parameter: given.given(setting)})
-        encode, decode = work_of(motion, variant.codec, params)
+        encode, decode = codec_calls(motion, variant.codec, params)
         row = {"label": variant.label, "setting": setting, "live": False}
         seconds = {"encode": cpu_seconds(encode), "decode": cpu_seconds(decode)}
         rows.append(row | {f"{k}_fps": motion.n_frames / v for k, v in seconds.items()})

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from mcz.codecs import CODECS, bitstream_name
 from mcz.container import payloads
-from mcz.container.chunks import HEADER, parse_header
+from mcz.container.chunks import HEADER, parse_chunk_header
 from mcz.container.dictionary_deflate import unpack_skeleton
 from mcz.container.limits import BASE
 from mcz.errors import MczError
@@ -60,7 +60,7 @@ def _payloads(data: bytes, kind: bytes) -> Iterator[bytes]:
 def _length(data: bytes, at: int) -> int | None:
     """The length that a header says, all ones where it is open; None where it is no header."""
     try:
-        chunk = parse_header(data[at : at + HEADER.size], at)
+        chunk = parse_chunk_header(data[at : at + HEADER.size], at)
     except MczError:
         return None
     return OPEN if chunk.length is None else chunk.length

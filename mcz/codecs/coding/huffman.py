@@ -1,4 +1,4 @@
-"""Canonical prefix codes after Huffman, and integers in classes that such a code names.
+"""Canonical prefix codes after Huffman, and integers in classes with such codes.
 
 SPEC.md, "Prefix codes", is normative. Source: D. A. Huffman, A method for the construction of
 minimum-redundancy codes, 1952; lengths limited by package-merge (Larmore and Hirschberg, 1990).
@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import FormatError
-
-Ints = NDArray[np.int64]
+from mcz.model.types import Ints
 
 MAX_LENGTH = 15  # SPACE-13
 DIRECT = 16  # integers below it are classes of their own
@@ -33,10 +31,9 @@ def class_of(value: int) -> tuple[int, int]:
 
 
 def code_lengths(counts: Sequence[int]) -> list[int]:
-    """The length of each symbol's code, 0 where its count is 0, at most ``MAX_LENGTH``.
+    """The length of each symbol's code, 0 if its count is 0, at most ``MAX_LENGTH``.
 
-    The code is as short as one of such lengths can be. Where one symbol occurs alone, its length
-    is 1.
+    The code is the shortest one of such lengths. If one symbol occurs alone, its length is 1.
 
     >>> code_lengths([5, 0, 1, 1])
     [1, 0, 2, 2]
@@ -62,8 +59,8 @@ def code_lengths(counts: Sequence[int]) -> list[int]:
 def codes_of(lengths: Sequence[int], where: str) -> Ints:
     """Canonical code of each symbol: shorter codes first, equal lengths in symbol order.
 
-    Raises FormatError unless the lengths make a whole code: no string of bits begins without one.
-    One symbol alone, of length 1, is a code as well.
+    Raises FormatError unless the lengths make a complete code: every string of bits begins with
+    one. A single symbol of length 1 is a code as well.
     """
     used = [length for length in lengths if length]
     if any(length > MAX_LENGTH for length in used):

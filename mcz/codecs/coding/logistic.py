@@ -9,11 +9,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
+from mcz.model.types import Ints
 
-# 65536 / (1 + exp(-k / 2)) for k = -16 to 16, rounded: squash lies on straight lines between.
+# 65536 / (1 + exp(-k / 2)) for k = -16 to 16, rounded: squash is linear between them.
 NODES = (
     *(22, 36, 60, 98, 162, 267, 439, 720, 1179, 1921, 3108, 4971, 7812, 11955, 17625, 24743),
     *(32768,),
@@ -22,7 +21,7 @@ NODES = (
     *(65438, 65476, 65500, 65514),
 )
 LIMIT = 2047  # of a stretched probability
-COUNT_LIMIT = 250  # from here on a probability no longer learns more slowly (RANGE-05)
+COUNT_LIMIT = 250  # from here on the learning rate of a probability stays constant (RANGE-05)
 
 
 @cache
@@ -39,12 +38,12 @@ def squash_table() -> Ints:
 def stretch_table() -> Ints:
     """stretch at index p >> 4: the least x in -2047 to 2047 whose squash is >= 16 (p >> 4) + 8."""
     reachable = squash_table()[1:]  # x from -2047
-    wanted = 16 * np.arange(4096) + 8  # RANGE-05
-    table: Ints = np.searchsorted(reachable, wanted) - LIMIT
+    targets = 16 * np.arange(4096) + 8  # RANGE-05
+    table: Ints = np.searchsorted(reachable, targets) - LIMIT
     return np.minimum(table, LIMIT)
 
 
 @cache
 def rate_table() -> Ints:
-    """65536 / (n + 2), rounded down: how fast a probability that was used n times learns."""
+    """65536 / (n + 2), rounded down: the learning rate of a probability after n uses."""
     return 65536 // (np.arange(COUNT_LIMIT + 1, dtype=np.int64) + 2)

@@ -76,12 +76,12 @@ def code_residual(
         return FAULT
     if length == 0:
         return 0
-    found = code_size(state, data, size, length, kf, ks, first)
+    coded_size = code_size(state, data, size, length, kf, ks, first)
     at = first[0] + C_SIDE
     b = at + 3 + 3 * sides[0] + sides[1]
     side = 1 if residual < 0 else 0
     side = mixed(state, data, side, first[1] + M_SIDE, at + sides[0], b, at + 12 + sides[2])
-    return -found if side == 1 else found
+    return -coded_size if side == 1 else coded_size
 
 
 def code_length(

@@ -68,11 +68,11 @@ def code_frame(
                 slow = (track[SLOW] + 8 * abs(above) + 4 * abs(higher)) >> 1  # FRAME-08
                 scales, near = (fast, slow), min(bits(start + length - r), 7)
                 sides, base = (side_of(track[LAST]), side_of(side), side_of(track[BEFORE])), OTHERS
-            found = code_residual(state, data, indices[r], scales, near, sides, base)
-            if found == FAULT or abs(found) > MAX_INDEX:  # SPACE-12
+            fault = code_residual(state, data, indices[r], scales, near, sides, base)
+            if fault == FAULT or abs(fault) > MAX_INDEX:  # SPACE-12
                 return 1
-            indices[r] = found
-            higher, above = above, found
+            indices[r] = fault
+            higher, above = above, fault
     if first == 0:  # FRAME-08
         remember(indices, tracks)
     return 0

@@ -1,7 +1,7 @@
-"""Streams of bits around compiled loops, and the states in which their coders begin.
+"""Streams of bits around compiled loops, and the start states of their coders.
 
-SPEC.md, "Entropy coding", is normative. A loop takes the coder's state and the bytes, codes or
-decodes, and returns True on success. Start states come of the start tables of SPEC.md's annexes.
+SPEC.md, "Entropy coding", is normative. A loop gets the coder's state and the bytes, codes or
+decodes, and returns True on success. Start states are from the start tables of SPEC.md's annexes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def _coder() -> ModuleType:
 
 
 def bare_state() -> Ints:
-    """The state of a coder that codes numbers of even bits alone, with no contexts."""
+    """The state of a coder of numbers with equally likely bits, without contexts."""
     return np.zeros(_coder().SQUASH, np.int64)
 
 
@@ -50,7 +50,7 @@ def code(start: Ints, size: int, loop: Loop, what: str) -> bytes:
 def uncode(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: bool) -> None:
     """Run ``loop`` on ``stream``; ``whole``: all its bytes must be needed.
 
-    Raises FormatError, with ``what`` in front, where it is no code or has other bytes.
+    Raises FormatError, with ``what`` in front, for a bad code or extra bytes.
     """
     data = np.frombuffer(stream, np.uint8).copy()  # compiled once: for writable bytes
     state = start.copy()
@@ -62,7 +62,7 @@ def uncode(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: bool) ->
 
 
 def scale_of(halves: int) -> int:
-    """The scale that half octaves stand for, about 2^(h / 2)."""
+    """The scale of so many half octaves, about 2^(h / 2)."""
     return (2 + (halves & 1)) << (halves >> 1) >> 1
 
 

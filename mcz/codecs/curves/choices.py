@@ -22,8 +22,8 @@ from mcz.model.types import Bools, Floats, Ints, Params, Settings
 MAX_INDEX = 2**40
 LEAST_STEP = 2.0**-100
 LEAST_LEVER = 2.0**-30
-STEP_SHARE = 0.75  # of the distance that is allowed, a step, where no decimals are given
-FEWEST_MOST = 512  # frames between marks up to which the fewest breaks are looked for
+STEP_SHARE = 0.75  # a step, of the allowed distance, if no decimals are given
+FEWEST_MOST = 512  # greatest distance of marks for the search for the fewest breaks
 
 PRESETS: dict[str, Settings] = {
     "default": {"d2_lmt": 1.0, "delta": 40, "Q": None, "middle": "least-squares"},
@@ -43,7 +43,7 @@ class Plan:
     step: float
     lever: float  # of a length unit, where steps are scaled: a position counts as value / lever
     method: int
-    closed: bool  # the bound holds for decoded points, not for those before rounding
+    closed: bool  # the bound applies to decoded points, not to those before rounding
     fewest: bool
     segment_frames: int  # 0: the size decides
 
@@ -57,7 +57,7 @@ class Plan:
         with np.errstate(over="ignore"):
             sizes = np.abs(points) * per if per else np.abs(points) / step
         indices = np.floor(sizes + 0.5)
-        if not (indices <= MAX_INDEX).all():  # a fit of huge points may be no number
+        if not (indices <= MAX_INDEX).all():  # a fit of huge points may be NaN
             raise MotionError("qbc: a control point exceeds 2^40 quantizer steps")
         return np.where(points < 0, -indices, indices).astype(np.int64)
 
@@ -87,7 +87,7 @@ def plan_of_options(params: Params, layout: Layout) -> Plan:
     chosen, published = preset_values(PRESETS, params), params["preset"] == "khan2014"
     limit, decimals = chosen["d2_lmt"], chosen["Q"]
     if decimals is None and not limit > 0:
-        raise OptionError("qbc: d2_lmt is 0 and no Q is given, so that there is no step")
+        raise OptionError("qbc: d2_lmt is 0 and no Q is given, which leaves no step")
     fewest = params["breaks"] == "fewest"
     if fewest and chosen["delta"] > FEWEST_MOST:
         raise OptionError(f"qbc: breaks fewest need a delta of at most {FEWEST_MOST}")

@@ -78,8 +78,6 @@ STEP = If(this.decimals == SCALED, bounded(Float64l, LEAST_STEP, 1 / LEAST_STEP)
 
 
 class QbcHeader(Record):
-    """Header of qbc."""
-
     delta: int = field(
         bounded(UVARINT, 1, MAX_DELTA), "frames from mark to mark, 1 to 2^20"
     )  # QBC-02
@@ -145,8 +143,8 @@ def _segment_length(layout: Layout, plan: Plan) -> int:
             f"qbc: delta {delta} is more than the {most} frames that a segment of "
             f"{layout.n_channels} channels may have"
         )
-    wanted = -(-(plan.segment_frames or SEGMENT_FRAMES) // delta) * delta
-    return max(delta, min(wanted, most // delta * delta))
+    length = -(-(plan.segment_frames or SEGMENT_FRAMES) // delta) * delta
+    return max(delta, min(length, most // delta * delta))
 
 
 def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
@@ -172,7 +170,7 @@ def preview(header: bytes, layout: Layout, spans: Sequence[Span]) -> Ints:
 
 
 def marks_of(first: int, stop: int, n_frames: int, delta: int) -> Ints:
-    """Frames with a mark that bear on the segment: its own, and the first behind it."""
+    """Frames with a mark that affect the segment: its own, and the first after it."""
     frames = list(range(first, stop, delta))
     if stop < n_frames:
         frames.append(stop)
@@ -247,19 +245,18 @@ def _read_segment(
     request: Request,
     fetch: Fetch,
 ) -> None:
-    """Write the frames of one segment where they belong."""
     from mcz.codecs.curves import kernels
 
     span = spans[index]
     start, stop = max(span.first, request.start), min(span.stop, request.stop)
     frames = marks_of(span.first, span.stop, fields.coded_frames, fields.delta)
     own = len(frames) - (span.stop < fields.coded_frames)
-    # In a damaged file the segment behind may be lost, and another one follow in the list.
+    # In a damaged file the next segment may be lost, and another one follow in the list.
     is_last = index + 1 == len(spans) or spans[index + 1].first != span.stop
     needs_next = stop > frames[own - 1] + 1
     if own < len(frames) and is_last and needs_next:  # QBC-12, QBC-13
-        raise FormatError(f"qbc: frames before {span.stop} need the segment behind")
-    # The next segment is not fetched where a part of this one can do without.
+        raise FormatError(f"qbc: frames before {span.stop} need the next segment")
+    # The next segment is not fetched if the requested part of this one does not need it.
     whole = own == len(frames) or not (is_last or (stop < span.stop and not needs_next))
     frames = frames if whole else frames[:own]
     is_position = position_channels(layout)
@@ -297,7 +294,7 @@ def _points(indices: Ints, fields: QbcHeader, steps: Floats | None) -> Floats:
 
 
 def cut(header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[int]) -> bytes:
-    """The header for stored frames first <= f < stop alone."""
+    """The header for stored frames first <= f < stop."""
     fields = parse(QbcHeader, header, "qbc header")
     fields.coded_frames -= first
     return build(fields, "qbc header")

@@ -76,7 +76,7 @@ def parse_marks(stream: bytes, count: int, n_channels: int, name: str) -> Ints:
 
 
 def parse_first_mark(stream: bytes, n_channels: int, name: str) -> Ints:
-    """The first of some marks, (1, channels), which takes no context."""
+    """The first of some marks, (1, channels), which is coded without context."""
     points = np.zeros((1, n_channels), np.int64)
     if stream:
         _scale(stream, 0, name)

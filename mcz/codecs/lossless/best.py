@@ -52,7 +52,7 @@ from mcz.codecs.segments import Sizing, gather, lossless_segment_frames, segment
 from mcz.errors import FormatError
 from mcz.model.numbers import Grid
 from mcz.model.schema import varint
-from mcz.model.threads import in_force
+from mcz.model.threads import thread_limit
 from mcz.model.types import Ints, Params
 
 if TYPE_CHECKING:
@@ -65,10 +65,10 @@ SIZING = Sizing(60_500, 65_000, value_bytes=1.5, most_rows=MOST_ROWS, spare=1, f
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
+    """Encode the ordinals of ``source``; ``segment_frames`` 0 chooses lengths by size."""
     prepare = partial(_prepare, source)
     return Encoded(
-        b"", segments_by_guess(source, params["segment_frames"], SIZING, prepare, in_force())
+        b"", segments_by_guess(source, params["segment_frames"], SIZING, prepare, thread_limit())
     )
 
 
@@ -120,7 +120,7 @@ Words = NDArray[np.int32]
 Bytes = NDArray[np.uint8]
 
 AS_FAST, PREDICTED, ECHOED = range(3)  # method
-WORK, SPARE = 64, 1024  # references x rows that a byte pays for; bytes that are given
+WORK, SPARE = 64, 1024  # references x rows that a byte is worth; spare bytes
 
 
 @cache
@@ -147,7 +147,7 @@ def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> byt
             stream = code_plan(plan, chosen, repeated)
             if _work(chosen, len(leads)) <= WORK * (len(stream) + SPARE):
                 streams.append(stream)
-    # Last, because it changes the heads: it gives them parents.
+    # Last, because it adds parents to the heads.
     streams.append(bytes((AS_FAST,)) + builder.write(plan)[0])
     return min(streams, key=len)
 
@@ -167,7 +167,7 @@ def _work(references: Sequence[Sequence[int]], n_rows: int) -> int:
 
 
 def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[Echo]) -> bytes:
-    """The stream of method 1, or of method 2 where there are echoes, of at least one lane."""
+    """The stream of method 1, or of method 2 with echoes, of at least one lane."""
     own, _, residual = kernels()
     head, tail, *_, write = fast_kernels()
     coded, columns = plan.lanes, plan.channels.columns
@@ -200,11 +200,12 @@ class _Model:
     def __init__(self, lanes: Predictors, echoes: Ints, leads: Words, rests: Rests) -> None:
         self.lanes, self.echoes, self.leads, self.rests = lanes, echoes, leads, rests
         n_lanes, most = leads.shape[1], kernels()[0].MOST_REFERENCES
-        self.references = np.zeros((n_lanes, 1 + most), np.int64)  # their number, then they
+        # their number, then the references
+        self.references = np.zeros((n_lanes, 1 + most), np.int64)
         self.most_work: int | None = None  # of references x rows, for a decoder
 
     def run(self, state: Ints, data: Bytes) -> bool:
-        """Code references, leads and rests in place; False where one of them has no code."""
+        """Code references, leads and rests in place; False if one of them has no code."""
         own, _, residual = kernels()
         total = own.code_references(state, data, self.references)
         if total < 0:
@@ -213,7 +214,7 @@ class _Model:
         if self.most_work is not None and work > self.most_work:  # BEST-12
             raise FormatError("best: more references than its bytes pay for")
         args = state, data, self.lanes, self.references, self._regressions(), self.echoes
-        with np.errstate(all="ignore"):  # an estimate may be no number
+        with np.errstate(all="ignore"):  # an estimate may be NaN
             return bool(own.code_leads(*args, self.leads, self.rests) < 0)
 
     def _regressions(self) -> Regressions:
@@ -266,7 +267,7 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
 
 
 def _exact_echoes(table: Ints, decoder: SegmentDecoder) -> Ints:
-    """The places of ``table`` whose ordinals echoes give: in units an ordinal is its lead."""
+    """The places of ``table`` whose ordinals echoes determine: in units an ordinal is its lead."""
     head = fast_kernels()[0]
     forms = decoder.heads.plans[decoder.lanes.columns, head.FORM]
     return np.where(np.isin(forms, WITH_UNIT), 0, table)

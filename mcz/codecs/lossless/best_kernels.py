@@ -139,8 +139,8 @@ def echo_of(leads: Words2, place: int) -> int:
     """The lead at ``place``, counted through from 1; of the other sign where that is below 0."""
     at = abs(place) - 1
     n_channels = leads.shape[1]
-    found = int(leads[BEHIND + at // n_channels, at % n_channels])
-    return found if place > 0 else -1 - found
+    lead = int(leads[BEHIND + at // n_channels, at % n_channels])
+    return lead if place > 0 else -1 - lead
 
 
 @kernel

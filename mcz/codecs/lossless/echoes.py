@@ -1,8 +1,8 @@
-"""Echoes of best: runs of numbers that were there before, of the same channel or another.
+"""Echoes of best: runs of numbers that repeat earlier ones, of the same channel or another.
 
-A loop that is played twice has them, and a gait of which half was computed and half mirrored.
-SPEC.md, "Codec 2: best", is normative for what they say, not for how they are found. The choice of
-the channels that a channel is predicted from is here too; mcz/codecs/lossless/README.md has both.
+Repeated loops have them, and gaits whose halves are mirrored. SPEC.md, "Codec 2: best", is
+normative for their meaning, not for the search. The choice of the channels that predict a channel
+is here too; mcz/codecs/lossless/README.md describes both.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from mcz.model.types import Bools, Floats, Ints
 FIELDS = 6  # of an echo, before its flags
 MINUS = 1  # flag
 
-VOTES = 8  # equal numbers that make an echo worth a look
+VOTES = 8  # equal numbers that make an echo a candidate
 LOOKS = 16  # at echoes, for each channel
-COST = 56  # bits that one takes
+COST = 56  # bits of an echo
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +56,9 @@ def build_echoes(echoes: Sequence[Echo]) -> bytes:
 
 
 def read_echoes(data: bytes, n_rows: int, may_echo: Sequence[bool]) -> tuple[list[Echo], int]:
-    """The echoes that ``data`` begins with, and the offset after them.
+    """The echoes at the start of ``data``, and the offset after them.
 
-    ``may_echo``: of each coded channel, that it has no rests.
+    ``may_echo``: mask of the coded channels without rests.
     """
     count, at = read_varint(data, 0)
     left = n_rows * len(may_echo)
@@ -110,14 +110,14 @@ def echo_table(echoes: Sequence[Echo], n_rows: int, n_channels: int) -> Ints:
     return table
 
 
-# How they are found
+# The search
 
 
 def find_echoes(numbers: Ints, leads: Words, usable: Ints) -> list[Echo]:
-    """Echoes in ``numbers`` (rows, channels) that are likely to pay; mostly none.
+    """Echoes in ``numbers`` (rows, channels) that probably save bytes; mostly none.
 
-    Numbers of which one was there before vote for how far and in which channel that was. ``leads``
-    must repeat as well. ``usable``: the channels that are looked at.
+    Numbers that equal an earlier one vote for its lag and channel. ``leads`` must repeat as well.
+    ``usable``: mask of the channels to search.
     """
     if len(usable) == 0 or len(numbers) < 2 * VOTES:
         return []
@@ -127,7 +127,7 @@ def find_echoes(numbers: Ints, leads: Words, usable: Ints) -> list[Echo]:
     np.not_equal(own[1:], own[:-1], out=changes[1:])
     weights = _bits(own)
     covered = np.zeros(own.shape, bool)
-    found: list[Echo] = []
+    echoes: list[Echo] = []
     for lag, channel, source, minus in _candidates(own, changes):
         same = ~covered[lag:, channel]
         for rows in (own, own_leads):
@@ -138,8 +138,8 @@ def find_echoes(numbers: Ints, leads: Words, usable: Ints) -> list[Echo]:
             if np.count_nonzero(changes[rows_of, channel]) * weights[channel] > COST:
                 covered[rows_of, channel] = True
                 place = int(usable[channel]), 1, lag, int(usable[source])
-                found.append(Echo(lag + start, stop - start, *place, minus))
-    return _merge_echoes(found)
+                echoes.append(Echo(lag + start, stop - start, *place, minus))
+    return _merge_echoes(echoes)
 
 
 def _bits(numbers: Ints) -> Floats:
@@ -191,7 +191,7 @@ def _merge_echoes(echoes: list[Echo]) -> list[Echo]:
     return merged
 
 
-WINDOW = 96  # rows in which a channel is compared with others
+WINDOW = 96  # rows of a comparison of channels
 CANDIDATES = 64  # channels that are compared at all
 LEAST_GAIN, GAIN_ROWS = 0.05, 5.0  # octaves that one more must save; and in all rows together
 
@@ -203,11 +203,11 @@ def choose_references(leads: Words, most: int, most_in_all: int) -> list[tuple[i
     """
     steps = np.diff(leads.astype(np.float64), axis=0, prepend=leads[:1])
     bends = _windows(np.diff(steps, axis=0, prepend=steps[:1]))
-    found: list[tuple[int, ...]] = []
+    references: list[tuple[int, ...]] = []
     for channel in range(leads.shape[1]):
-        found.append(_explain(bends, channel, min(most, most_in_all)))
-        most_in_all -= len(found[-1])
-    return found
+        references.append(_explain(bends, channel, min(most, most_in_all)))
+        most_in_all -= len(references[-1])
+    return references
 
 
 def _windows(values: Floats) -> Floats:
@@ -240,7 +240,7 @@ def _explain(bends: Floats, channel: int, most: int) -> tuple[int, ...]:
 
 
 def _reference_candidates(bends: Floats, channel: int, rest: Floats, floor: float) -> list[int]:
-    """The channels before ``channel`` that explain most of it alone."""
+    """The channels before ``channel`` that explain most of it individually."""
     if channel <= CANDIDATES:
         return list(range(channel))
     before = bends[:, :channel]
@@ -249,7 +249,7 @@ def _reference_candidates(bends: Floats, channel: int, rest: Floats, floor: floa
 
 
 def _gains(rest: Floats, others: Floats, sizes: Floats, floor: float) -> Floats:
-    """Octaves by which each of ``others`` (windows, channels, rows) makes ``rest`` smaller."""
+    """Octaves by which each of ``others`` (windows, channels, rows) reduces ``rest``."""
     products = np.einsum("nw,nkw->nk", rest, others)
     whole = np.einsum("nw,nw->n", rest, rest)[:, None]
     smaller = np.maximum(whole - products * products / sizes, 0)

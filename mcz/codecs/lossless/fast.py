@@ -1,9 +1,9 @@
-"""Codec 1, ``fast``: linear prediction and adaptive Rice codes, made to be read.
+"""Codec 1, ``fast``: linear prediction and adaptive Rice codes, for fast reading.
 
 SPEC.md, "Codec 1: fast", is normative.
 
-Exactness: lossless and bit-exact; integers only, in 32 bits but for ordinals. All streams of a
-segment are coded together, as a channel may follow one of another group.
+Exactness: lossless and bit-exact; integers only, in 32 bits except for ordinals. All streams of a
+segment are coded together, as a channel may depend on one of another group.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SIZING = Sizing(60_000, 63_000, value_bytes=1.5, most_rows=USUAL_ROWS, spare=1)
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
+    """Encode the ordinals of ``source``; ``segment_frames`` 0 chooses lengths by size."""
     fixed: int = params["segment_frames"]
     most = min(MOST_ROWS if fixed else USUAL_ROWS, MOST_VALUES // max(1, source.layout.n_channels))
     prepare = partial(_prepare, source, _builder(source.layout))

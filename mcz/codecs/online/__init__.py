@@ -1,1 +1,1 @@
-"""Groups of frames, coded as they come: online."""
+"""Groups of frames, coded as they arrive: online."""

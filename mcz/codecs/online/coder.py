@@ -1,4 +1,4 @@
-"""Units made of frames and frames of units, with all that is remembered from frame to frame.
+"""Units from frames and frames from units, with the state between frames.
 
 SPEC.md, "Codec 21: online", is normative; the names below are its field names.
 """
@@ -23,9 +23,9 @@ from mcz.model.schema import Record, field, one_of, parse
 from mcz.model.types import Floats
 
 NAME = "online"
-N_KINDS = 2  # start tables of a coder: for LTRs that are intra coded, and others
+N_KINDS = 2  # start tables of a coder: for intra coded LTRs, and others
 AS_IS, REORDERED = 0, 1  # orders
-COEFFICIENT_BYTES = 40  # more than the bits of one take
+COEFFICIENT_BYTES = 40  # more than the greatest size of one
 
 
 class OnlineHeader(Record):
@@ -55,7 +55,7 @@ def _coding() -> ModuleType:
     return mixing
 
 
-def parse_header(header: bytes) -> OnlineHeader:
+def parse_online_header(header: bytes) -> OnlineHeader:
     """The fields of OnlineHeader; raises FormatError."""
     fields = parse(OnlineHeader, header, f"{NAME} header")
     if fields.space.flags & (MEAN | COURSES):  # ONLINE-04
@@ -79,11 +79,11 @@ class Coder:
     """Encoder or decoder of one signal; raises FormatError for a bad header."""
 
     def __init__(self, header: bytes, layout: Layout) -> None:
-        fields = parse_header(header)
+        fields = parse_online_header(header)
         self.header, self.coder = header, int(fields.coder)
         self.space = _space(fields, layout)
         self.at = 0  # number of the frame that is due
-        self._ltr: int | None = None  # number of the last LTR, None where it is not known
+        self._ltr: int | None = None  # number of the last LTR, None if unknown
         self._whole = False  # the frame before is known
         self._state = start_states("online")[N_KINDS * self.coder].copy()
         self._values = np.zeros(len(self.space.weights))
@@ -94,7 +94,7 @@ class Coder:
         self._analysis = np.zeros((0, 0))
 
     def skip(self, n_frames: int) -> None:
-        """So many frames are not known."""
+        """Skip so many lost frames."""
         self.at += n_frames
         self._whole = self._whole and not n_frames
 
@@ -106,8 +106,8 @@ class Coder:
     def decode(self, unit: Unit) -> Floats:
         """The frames of a unit, (frames, n_channels).
 
-        Raises LostFrameError where a frame that it needs is not known, FormatError on bad bytes; in
-        both cases its frames are not known then.
+        Raises LostFrameError if a frame that it needs is unknown, FormatError on bad bytes; in both
+        cases its frames are unknown then.
         """
         out = np.empty((unit.n_frames, len(self._values)))
         before = self._reference.copy(), self._memory.copy()
@@ -143,7 +143,7 @@ class Coder:
     def encode(self, kind: int, frames: Floats, n_group: int, threshold: float, plan: Any) -> Unit:
         """A unit of frames, (frames, n_channels), of a group of ``n_group``; raises MotionError.
 
-        One frame that is refused changes nothing that matters to the next.
+        A refused frame does not affect the next.
         """
         if not self._analysis.size:
             self._analysis = np.ascontiguousarray(np.concatenate(self.space.analysis()))
@@ -168,7 +168,6 @@ class Coder:
         return unit
 
     def _begin(self, kind: int) -> None:
-        """A group begins with nothing learned but the start table of its kind."""
         if kind != STR:  # ONLINE-15
             table = start_states("online")[N_KINDS * self.coder + (kind == LTR)]  # ONLINE-15
             self._state = table.copy()

@@ -264,16 +264,16 @@ def _quantize(indices: Ints, coefficients: Floats, ratio: float, threshold: floa
 
 
 def _choose(
-    indices: Ints, coefficients: Floats, wanted: float, threshold: float, is_fixed: bool
+    indices: Ints, coefficients: Floats, target: float, threshold: float, is_fixed: bool
 ) -> tuple[int, float]:
     """Choose the step code next to ``wanted``, fill ``indices``; also return the mean square.
 
     Where the step is not fixed it grows until no coefficient is too large.
     """
-    if wanted >= NEVER:
+    if target >= NEVER:
         indices[:] = 0
         return FIRST_STEP, 0.0
-    code = int(min(max(np.rint(8.0 * wanted) + FIRST_STEP, 0), N_STEPS - 1))
+    code = int(min(max(np.rint(8.0 * target) + FIRST_STEP, 0), N_STEPS - 1))
     variance = _quantize(indices, coefficients, _ratio(code), threshold)
     while variance < 0 and not is_fixed and code < N_STEPS - 8:
         code += 8
@@ -310,22 +310,22 @@ def encode_frames(
             return at
         if kind:
             begin_group(plan, n_group)
-            wanted = ltr_step(plan, coefficients, kind == INTRA, n_group, choice.laplace)
+            target = ltr_step(plan, coefficients, kind == INTRA, n_group, choice.laplace)
         else:
-            wanted = str_step(plan, len(coefficients), n_group, choice.gauss)
+            target = str_step(plan, len(coefficients), n_group, choice.gauss)
         code, variance = _choose(
-            indices, coefficients, wanted, choice.threshold, plan[MODE] == FIXED
+            indices, coefficients, target, choice.threshold, plan[MODE] == FIXED
         )
         if variance < 0:
             return at
-        if wanted < NEVER:
-            wanted = np.log2(_ratio(code))
+        if target < NEVER:
+            target = np.log2(_ratio(code))
         before = _bits_of(state)
         code = _code_frame(state, data, coder, kind, indices, code, transform.starts, past)
         values[:] = predicted
         add_frame(values, indices, transform, transform.step * _ratio(code), sums)
         if kind:
             past.reference[:] = values
-        settle(plan, kind, wanted, _bits_of(state) - before, variance)
+        settle(plan, kind, target, _bits_of(state) - before, variance)
         kind = STR
     return -1

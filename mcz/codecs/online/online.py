@@ -37,7 +37,7 @@ from mcz.codecs.online.coder import (
     STR,
     Coder,
     OnlineHeader,
-    parse_header,
+    parse_online_header,
 )
 from mcz.codecs.online.rate_control import (
     CHANGEABLE,
@@ -58,14 +58,14 @@ from mcz.errors import FormatError, OptionError
 from mcz.model.schema import build
 from mcz.model.types import Bools, Floats, Params, Settings
 
-SEGMENT_FRAMES = 1200  # at least, but for the last
+SEGMENT_FRAMES = 1200  # at least, except for the last
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
     """Encode the values of ``source``; invalid values are interpolated.
 
-    Raises MotionError for a value that is not finite, or is too large, OptionError for parameters
-    that contradict each other, or a rate where no frame rate is known.
+    Raises MotionError for a value that is not finite, or is too large, OptionError for
+    contradictory parameters, or a rate without a known frame rate.
     """
     chosen = settle_options(params)
     choice, order = choose_options(sample_of(NAME, source), chosen)
@@ -89,7 +89,7 @@ class _Writer:
         self.chosen, self.layout = dict(chosen), layout
         self.coder = Coder(header, layout)
         self.plan = plan_of(chosen, layout, self.coder.space.step)
-        self.left = 0  # frames of the group that are still to come
+        self.left = 0  # remaining frames of the group
         self._size = 0  # of the group
         self._groups = 0  # since the last intra coded one
         self._waiting: Settings | None = None  # parameters of the next group on
@@ -104,7 +104,7 @@ class _Writer:
         return LTR
 
     def code(self, frames: Floats, n_group: int | None = None) -> Unit:
-        """The unit of frames of one group, which has ``n_group`` in all; raises MotionError."""
+        """The unit of frames of one group of ``n_group`` frames; raises MotionError."""
         if not self.left and self._waiting is not None:
             self.chosen, self._waiting = self._waiting, None
             set_plan(self.plan, self.chosen, self.layout, self.coder.space.step)
@@ -123,7 +123,7 @@ class _Writer:
 
 
 def _segments(source: SignalSource, writer: _Writer) -> Iterator[Segment]:
-    """Whole groups, and from an intra coded LTR on where there are such."""
+    """Whole groups, and from an intra coded LTR on if there are any."""
     layout = source.layout
     if not layout.n_channels:
         if layout.n_frames:
@@ -202,7 +202,7 @@ def _needed_units(spans: Sequence[Span], request: Request, fetch: Fetch) -> list
 
 def uses(header: bytes) -> tuple[bytes, ...]:
     """The models that a header names."""
-    return uses_of(parse_header(header).space)
+    return uses_of(parse_online_header(header).space)
 
 
 class _LiveEncoder(LiveEncoder):

@@ -1,8 +1,8 @@
 """Parameters and step targets of an ``online`` encoder, and their changes.
 
-mcz/codecs/online/README.md describes it; a decoder needs none of it.
-Source: C.-H. Kwak, I. V. Bajic, Online MoCap data coding with bit allocation, rate control, and
-motion-adaptive post-processing, eqs. 2, 3 and 17.
+mcz/codecs/online/README.md describes it; decoders do not need it. Source: C.-H. Kwak, I. V. Bajic,
+Online MoCap data coding with bit allocation, rate control, and motion-adaptive post-processing,
+eqs. 2, 3 and 17.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from mcz.model.types import Floats, Params, Settings
 # published -0.4121 and 3.2745, 0.05 and 2.0492 are those of the authors' own coder.
 FITS = {"c3d": (-0.1311, 1.2641), "bvh": (-0.0937, 1.2619)}
 LEAST_FLOOR = 2.0**-100  # steps
-FLOOR_CM, FLOOR_STEPS = 2.0, 4.0  # no deviation is taken to be smaller; steps: unit unknown
+FLOOR_CM, FLOOR_STEPS = 2.0, 4.0  # least deviation; steps: unit unknown
 MOST_TERMS = 40_000  # of an entropy
 
 
@@ -71,7 +71,7 @@ class Plan:
 def plan_of(chosen: Params, layout: Layout, step: float) -> Plan:
     """Plan at the start of a signal; ``step`` as in its header.
 
-    Raises OptionError where a rate is asked for and the frame rate is not known.
+    Raises OptionError for a rate if the frame rate is unknown.
     """
     kernels = _kernels()
     laplace, gauss = rates()
@@ -88,7 +88,7 @@ def set_plan(plan: Plan, chosen: Params, layout: Layout, step: float) -> None:
     if mode != "mod":
         if layout.frame_rate is None or not layout.frame_rate:
             raise OptionError(
-                "online: a bitrate needs a frame rate, this motion says none", hint=Hint.RATE
+                "online: a bitrate needs a frame rate, this motion states none", hint=Hint.RATE
             )
         per_frame = float(Fraction(1000) / layout.frame_rate)
         numbers[kernels.BUFFER] = max(1.0, chosen["buffer"] * float(layout.frame_rate))
@@ -139,7 +139,8 @@ def laplacian(step: float) -> float:
 def gaussian(step: float) -> float:
     """Entropy of a Gaussian of deviation 1, quantized with ``step``, in bits.
 
-    Eq. 3 is the sum of the three terms in the middle of this, which is no entropy at fine steps.
+    Eq. 3 is the sum of the three terms in the middle of this, which is not an entropy at fine
+    steps.
     """
     if step < 1e-3:  # differential entropy: the sum has tens of thousands of terms
         return 0.5 * math.log2(2 * math.pi * math.e) - math.log2(step)
@@ -185,7 +186,7 @@ PRESETS: dict[str, Settings] = {
     "rca": _PUBLISHED | {"rate_control": "rca"},
 }
 PRESET_IDS = {"default": 0, "mod": 1, "rc": 2, "rca": 3}  # of CLIP
-# May change while frames come, at the border of a group.
+# May change between groups.
 CHANGEABLE = {
     "step",
     "bitrate",
@@ -226,9 +227,7 @@ def choose_options(sample: Sample, chosen: Params) -> tuple[Choice, int]:
             raise OptionError(f"{NAME}: order reordered has cosines only, not basis {which}")
         sample, which, order = replace(sample, apart=False), "cosines", REORDERED
     elif which == "auto":
-        which = space_choices.basis_at_hand(
-            sample
-        )  # as live, so that a file is no better than its stream
+        which = space_choices.basis_at_hand(sample)  # as live, so that a file equals its stream
     return space_choices.choose_space(
         NAME, sample, step, which, space_choices.frame_differences
     ), order

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from mcz.errors import FormatError
 from mcz.model.schema import read_varint, varint
 
-STR, LTR, INTRA = 0, 1, 2  # what a frame is predicted from: the last, the last LTR, nothing
+STR, LTR, INTRA = 0, 1, 2  # reference of a frame: the last frame, the last LTR, none
 MIXED, GOLOMB = 0, 1  # coders
 MODES = ("mod", "rc", "rca", "steady")  # of an encoder's rate control
 
@@ -20,7 +20,7 @@ MODES = ("mod", "rc", "rca", "steady")  # of an encoder's rate control
 class Unit:
     """Frames coded together; ``kind`` of the first, the others are STR.
 
-    ``distance``: so many frames before the first lies the LTR that it is predicted from, where it
+    ``distance``: number of frames from the first back to the LTR that it is predicted from, if it
     is one itself.
     """
 

@@ -124,19 +124,19 @@ def _check(layout: Layout, spans: Sequence[Span]) -> None:
             raise FormatError(f"pca: the segment at {span.first} bears upon others")
 
 
-def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, wanted: int) -> Floats:
-    """The first ``wanted`` frames of a segment."""
+def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, n_frames: int) -> Floats:
+    """The first ``n_frames`` frames of a segment."""
     from mcz.codecs.pca import kernels
 
     scaled = decimals == SCALED
-    parts = parse_stream(stream, layout.n_channels, span.n_frames, wanted, scaled=scaled)
+    parts = parse_stream(stream, layout.n_channels, span.n_frames, n_frames, scaled=scaled)
     if scaled:
         step = ratio_of(parts.step)
         means, rows = parts.means * (step / MEAN_STEPS), parts.coefficients * step  # PCA-15
     else:
         means, rows = parts.means / 10.0**decimals, parts.coefficients / 10.0**decimals  # PCA-16
     basis = np.ldexp(parts.basis.astype(np.float64), -parts.shifts[:, None])
-    out = np.zeros((wanted, layout.n_channels))
+    out = np.zeros((n_frames, layout.n_channels))
     kernels.evaluate(out, _plain(means), _plain(basis), _plain(rows))
     return out
 
@@ -166,17 +166,17 @@ CODEC = Codec(
 )
 
 
-MEAN_STEPS = 4  # of means in one of coefficients, where there is no Q
-NOISE = 1.0  # of quantizing, as a share of what the components that are left out take away
-FINEST = 2.0**-16  # of the greatest component or mean: no step is finer
+MEAN_STEPS = 4  # of means per step of coefficients, without Q
+NOISE = 1.0  # of quantizing, as a share of the energy of omitted components
+FINEST = 2.0**-16  # of the greatest component or mean: the least step
 LARGEST = 2.0**80
-NEGLIGIBLE = 1e-24  # of the greatest energy: what is smaller is rounding
+NEGLIGIBLE = 1e-24  # of the greatest energy: less is rounding
 WELL_CONDITIONED = 1e4
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """The steps of a segment; ``code`` is that of the step where it is scaled."""
+    """The steps of a segment; ``code`` is the step's if it is scaled."""
 
     step: float
     mean_step: float
@@ -192,8 +192,9 @@ def grid_of(code: int) -> Grid:
 def components_of(values: Floats, q: int, decimals: int | None, *, by_frame: bool) -> Components:
     """The q greatest components of one segment, (frames, channels), in integers.
 
-    ``by_frame``: of each frame the mean over its channels is taken away, and kept as a component
-    more, instead of the mean of each channel. Raises MotionError for values that are too large.
+    ``by_frame``: the mean over the channels of each frame is subtracted, and kept as another
+    component, instead of the mean of each channel. Raises MotionError for values that are too
+    large.
     """
     if np.abs(values).max(initial=0.0) > LARGEST:
         raise MotionError("pca: a value exceeds 2^40 quantizer steps")

@@ -29,9 +29,7 @@ MAX_SCALE = 62
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """One segment in integers: means (channels,), basis (count, channels) and its shifts (count,),
-    coefficients (frames, count), and the step code, 0 where there is none.
-    """
+    """One segment in integers: means, basis (count, channels), shifts, coefficients, step code."""
 
     step: int
     means: Ints
@@ -41,7 +39,7 @@ class Components:
 
 
 def build_stream(components: Components, *, scaled: bool) -> bytes:
-    """The stream of a segment; raises MotionError where an integer is too large."""
+    """The stream of a segment; raises MotionError for too large an integer."""
     parts = (components.means, components.basis, components.coefficients)
     if any(len(part) and np.abs(part).max(initial=0) > MAX_INDEX for part in parts):
         raise MotionError("pca: a coefficient exceeds 2^40 quantizer steps")
@@ -74,9 +72,9 @@ def build_stream(components: Components, *, scaled: bool) -> bytes:
 
 
 def parse_stream(
-    stream: bytes, n_channels: int, n_frames: int, wanted: int, *, scaled: bool
+    stream: bytes, n_channels: int, n_frames: int, n_decoded: int, *, scaled: bool
 ) -> Components:
-    """The first ``wanted`` of ``n_frames`` frames; raises FormatError on bad bytes."""
+    """The first ``n_decoded`` of ``n_frames`` frames; raises FormatError on bad bytes."""
     means = np.zeros(n_channels, np.int64)
     if not stream:
         nothing = np.zeros(0, np.int64)
@@ -94,13 +92,13 @@ def parse_stream(
     if any(form & 63 > MAX_SCALE for form in sides[count:]):  # PCA-07
         raise FormatError("pca: the form of a component has the scale 63")
     basis = np.zeros((count, n_channels), np.int64)
-    rows = np.zeros((wanted, count), np.int64)
+    rows = np.zeros((n_decoded, count), np.int64)
     uncode(
         stream[at + 2 * count :],
         start_states("pca")[0],  # PCA-09
         lambda state, data: _loop(state, data, means, basis, rows, sides, mean_scale),
         "pca: a mean, a basis or a coefficient",
-        whole=wanted == n_frames,  # PCA-14
+        whole=n_decoded == n_frames,  # PCA-14
     )
     shifts = np.frombuffer(sides[:count], "u1").astype(np.int64)
     return Components(step, means, shifts, basis, rows)

@@ -1,6 +1,6 @@
 """Encoder choices of ``posewave`` before the first segment.
 
-mcz/codecs/posewave/README.md describes it; a decoder needs none of it.
+mcz/codecs/posewave/README.md describes it; decoders do not need it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from mcz.codecs.posewave.header import (
     PosewaveHeader,
     build_header,
     has_whole_turns,
-    parse_header,
+    parse_posewave_header,
 )
 from mcz.codecs.posewave.model import number_of
 from mcz.codecs.posewave.orders import N_NOTES, N_ORDERS, Orders, columns_by_axis, own_sequence
@@ -45,23 +45,23 @@ from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTA
 from mcz.model.schema import parse
 from mcz.model.types import Floats, Params, Settings
 
-# What a preset promises: how far off a point may be in any frame, in cm.
+# The greatest error of a point in any frame that a preset promises, in cm.
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}
 RADIUS_CM = 3.0  # of the shell, as ACL measures it
 PROPORTION = 1 / 30  # of the shell to the skeleton where the unit is unknown: 3 cm of 90 cm
-GREATEST_DEGREES = 4.0  # a step beyond which the metric says nothing any more, of fine steps
+GREATEST_DEGREES = 4.0  # fine steps beyond which the metric is meaningless
 SHELL = 8  # sixteenths
 FINE_SPREAD, COARSE_SPREAD = 2, 3  # octaves above 2^-10
-COARSE_CM = 0.065  # a step from which on the second start table is nearer
-SHARE_OF_CONSTANT = 0.25  # of a step: how far a constant channel may move points
-SPREAD_CM = 2.0  # a step of so much would be as large as a plain channel spreads
-SAMPLED_FRAMES = 128  # where it is measured
-FINE_CM = 0.08  # a step below which first poses are told more exactly
+COARSE_CM = 0.065  # from this step on the second start table is nearer
+SHARE_OF_CONSTANT = 0.25  # of a step: greatest effect of a constant channel on points
+SPREAD_CM = 2.0  # a step of this size equals the spread of a plain channel
+SAMPLED_FRAMES = 128  # for measuring it
+FINE_CM = 0.08  # below this step first poses are coded more precisely
 SPATIAL = (*ROTATION_KINDS, *POSITION_KINDS)
 LEVELS = ((0.06, (2, 3, 4, 5)), (0.2, (3, 4, 5, 6)), (math.inf, (4, 5, 6, 7)))  # tried below a step
 TRIAL_FRAMES = 2048
-SAMPLED = 8  # every so many frames an error is measured in a trial
-EXCHANGE = 0.75  # how fast bytes fall as errors rise, in logarithms: where a trial is better
+SAMPLE_DISTANCE = 8  # frames between measured ones in a trial
+EXCHANGE = 0.75  # fall of bytes per rise of errors, in logarithms, for comparing trials
 STEPS_CM = 0.01, 0.045  # between these steps the weight of a bit goes from the first to the second
 RATE_WEIGHTS = 0.09, 0.14
 USUAL = (  # steps, mean errors
@@ -70,7 +70,7 @@ USUAL = (  # steps, mean errors
 )
 MEAN_TO_BOUND = 0.22  # the mean error with which a bound takes the fewest bytes
 STEP_OF_BOUND = 0.2  # live, where rows of frames that are farther off get finer ones
-COARSEST_WEIGHT = 0.12  # of a bit at level 0, whose errors later rows are predicted from
+COARSEST_WEIGHT = 0.12  # of a bit at level 0, whose errors affect later rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def choose(source: SignalSource, params: Params) -> Choice:
     skeleton = skeleton_of(NAME, source.layout)
     unit = skeleton.unit_cm
     step = default_step(skeleton) if params["step"] is None else params["step"] / (unit or 1.0)
-    # With the unit unknown, a skeleton of 90 cm stands for all: only ratios follow from it.
+    # With the unit unknown, a skeleton of 90 cm is assumed: only ratios follow from it.
     step_cm = step * (unit or RADIUS_CM / PROPORTION / _extent(skeleton))
     weights = weights_of(step_cm)
     fields = _header_fields(skeleton, step, step_cm)
@@ -135,14 +135,14 @@ def _contacts(
         )
     tolerance = params["contact_tolerance"] * in_cm
     runs = runs_of(source, params["contacts"])
-    wanted = choose_contacts(skeleton, runs, tolerance, None if rate is None else float(rate))
-    return ([wanted.fields], ContactTracker(tolerance, wanted.pieces)) if wanted else ([], None)
+    chosen = choose_contacts(skeleton, runs, tolerance, None if rate is None else float(rate))
+    return ([chosen.fields], ContactTracker(tolerance, chosen.pieces)) if chosen else ([], None)
 
 
 def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) -> Choice:
     """Choose settings for live frames; ``step`` in cm, derived from the bound if None.
 
-    Raises OptionError where a bound is given that nobody could measure.
+    Raises OptionError for a bound in cm with an unknown unit.
     """
     unit = skeleton.unit_cm
     if step is None:
@@ -161,7 +161,7 @@ def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) 
 
 
 def guess_step(target: str, limit: float) -> float | None:
-    """A step in cm that comes near a mean error, or with which few frames miss a bound."""
+    """A step in cm near a mean error, or with which few frames miss a bound."""
     if target == "max_error_cm":
         limit *= MEAN_TO_BOUND
     elif target != "mean_error_cm":
@@ -180,7 +180,7 @@ def default_step(skeleton: Skeleton) -> float:
 
 
 def _extent(skeleton: Skeleton) -> float:
-    """The reach of a skeleton; 1 where it has none, or one beyond the range of floats."""
+    """The reach of a skeleton; 1 without one, or beyond the range of floats."""
     extent = reach(skeleton)
     return extent if 0 < extent < math.inf else 1.0
 
@@ -233,7 +233,7 @@ def _halvings(skeleton: Skeleton, step: float, step_cm: float) -> int:
 
 
 def _spreads(rows: Floats) -> Floats:
-    """The deviation of each channel from its mean, (n_channels,); 0 where nothing is known."""
+    """The deviation of each channel from its mean, (n_channels,); 0 if unknown."""
     known = np.isfinite(rows)
     n = np.maximum(known.sum(axis=0), 1)
     means = np.where(known, rows, 0.0).sum(axis=0) / n
@@ -245,9 +245,9 @@ def _spreads(rows: Floats) -> Floats:
 def _plain_steps(
     skeleton: Skeleton, spreads: Floats, step_cm: float, *, turning: bool = True
 ) -> Settings:
-    """Steps of channels that move nothing: a share of how far they spread, (n_channels,).
+    """Steps of channels that move no point: a share of their spread, (n_channels,).
 
-    ``turning``: those of quaternions that move something are steps of angles instead.
+    ``turning``: mask of quaternions that move points, whose steps are of angles instead.
     """
     share = step_cm / SPREAD_CM
     kinds = [channel.kind for channel in skeleton.channels]
@@ -300,16 +300,16 @@ def best_levels(
     values = FrameReader(NAME, source).next(n_frames)
     orders = Orders({order.joint: order.code for order in fields["orders"]}, skeleton)
     coded = orders.to_coded_order(values)
-    no_notes = np.zeros((-(-n_frames // SAMPLED), len(orders.places), N_NOTES), np.int64)
+    no_notes = np.zeros((-(-n_frames // SAMPLE_DISTANCE), len(orders.places), N_NOTES), np.int64)
 
     def score(levels: int) -> float:
-        header = parse_header(
+        header = parse_posewave_header(
             build_header(**{**fields, "levels": levels, "borrowing": min(1, levels)}), layout
         )
         streams, decoded = encode_coded(header, skeleton, coded, weights)
-        decoded = orders.values(decoded[::SAMPLED], no_notes)
-        decoded[:, header.exact] = values[::SAMPLED, header.exact]
-        error = distortion(header, skeleton, values[::SAMPLED], decoded)
+        decoded = orders.values(decoded[::SAMPLE_DISTANCE], no_notes)
+        decoded[:, header.exact] = values[::SAMPLE_DISTANCE, header.exact]
+        error = distortion(header, skeleton, values[::SAMPLE_DISTANCE], decoded)
         return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
 
     return _minimize(tried, score)
@@ -332,7 +332,7 @@ def distortion(header: Header, skeleton: Skeleton, values: Floats, decoded: Floa
     """Mean error of joints and points on their axes, weighted by joint."""
     try:
         chain = chain_of(skeleton)
-    except MotionError:  # without angles that mean something: by channel
+    except MotionError:  # without a known angle unit: by channel
         return float(np.mean(np.abs(values - decoded) / header.greatest)) * header.step
     away = []
     for (_, _, ours), (_, _, theirs) in zip(chain.poses(values), chain.poses(decoded), strict=True):
@@ -345,9 +345,9 @@ def distortion(header: Header, skeleton: Skeleton, values: Floats, decoded: Floa
     return float(np.mean(away)) if away else 0.0
 
 
-KEPT = 0  # among scores by code: the order of the source
-RUNS, RUN_FRAMES = 16, 128  # what is looked at of a long clip
-DUE = 0.985  # an order is taken where its score is less than this share of the source's
+SOURCE_ORDER = 0  # code of the order of the source
+RUNS, RUN_FRAMES = 16, 128  # sampled runs of a long clip
+DUE = 0.985  # an order is chosen if its score is below this share of the source's
 STILL = 1e-4  # of a turn: a joint whose steps change by less keeps its order
 GREATEST = 2.0**20  # of an angle, whose sine is exact enough in any unit
 
@@ -355,10 +355,8 @@ GREATEST = 2.0**20  # of an angle, whose sine is exact enough in any unit
 def choose_orders(source: SignalSource, exact: Container[int] = ()) -> dict[int, int]:
     """Codes of orders by joint, of joints that are calmer in another than the source's.
 
-    Joints with ``exact`` channels keep that of the source.
-
-    Angles that jump or turn fast cost bytes: bits by the logarithms of their second differences,
-    of which roots are near enough.
+    Joints with ``exact`` channels keep the source's order. Angles that jump or turn fast cost
+    bytes: bits by the logarithms of their second differences, approximated by roots.
     """
     skeleton = skeleton_of(NAME, source.layout)
     joints = [
@@ -376,14 +374,14 @@ def choose_orders(source: SignalSource, exact: Container[int] = ()) -> dict[int,
         highest = np.maximum(highest, np.abs(values[:, columns]).max(axis=(0, 2), initial=0.0))
         values = np.clip(values, -GREATEST, GREATEST)
         for code in range(1 + N_ORDERS):
-            codes = dict.fromkeys(joints, code) if code != KEPT else {}
+            codes = dict.fromkeys(joints, code) if code != SOURCE_ORDER else {}
             coded = Orders(codes, skeleton).to_coded_order(values)[:, columns]
             scores[code] += np.sqrt(np.abs(np.diff(coded, 2, axis=0))).sum(axis=(0, 2))
     full = Orders({}, skeleton).full
-    moves = (scores[KEPT] > np.sqrt(STILL * full) * n_rows) & (highest < GREATEST)
-    worth = moves & (scores.min(axis=0) < DUE * scores[KEPT])
-    best = np.where(worth, scores.argmin(axis=0), KEPT).tolist()
-    return {joint: code for joint, code in zip(joints, best, strict=True) if code != KEPT}
+    moves = (scores[SOURCE_ORDER] > np.sqrt(STILL * full) * n_rows) & (highest < GREATEST)
+    worth = moves & (scores.min(axis=0) < DUE * scores[SOURCE_ORDER])
+    best = np.where(worth, scores.argmin(axis=0), SOURCE_ORDER).tolist()
+    return {joint: code for joint, code in zip(joints, best, strict=True) if code != SOURCE_ORDER}
 
 
 def _runs(source: SignalSource) -> Iterator[Floats]:

@@ -1,6 +1,6 @@
-"""Encoder choice of contact points, and the frames in which each is held.
+"""Encoder choice of contact points, and of the frames in which each is held.
 
-A decoder needs none of it. SPEC.md, "Held contacts", says what comes of it.
+SPEC.md, "Held contacts", defines their effect; decoders do not need it.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from mcz.kinematics.points import points_of, positions_of
 from mcz.model.indexing import merged_ranges
 from mcz.model.motion import Skeleton
 
-Run = tuple[str, int, int]  # a joint whose first point stands, its first frame, how many frames
+Run = tuple[str, int, int]  # a joint whose first point stands, its first frame, number of frames
 Runs = tuple[Run, ...] | str
 
 AUTO = "auto"
 _ENTRY = re.compile(r"(?P<name>.+?)(?::(?P<first>\d+)\+(?P<count>\d+))?")
-BLOCK = 1024  # frames that are looked at together
+BLOCK = 1024  # frames of a block
 
-SPREAD = 0.866  # of the grid against the tolerance: no place is farther from it than 0.97
+SPREAD = 0.866  # of the grid relative to the tolerance: every place is within 0.97 of it
 ROUNDS = 4
 RAMP_SECONDS = 1 / 15
 
@@ -56,7 +56,7 @@ class ContactSettings:
 def parse_runs(given: Any) -> Runs:
     """Contacts as text or, from Python, as tuples of a joint, a first frame and a count.
 
-    "auto": wherever a foot stands by the usual rule. A joint without frames: where that one does.
+    "auto": wherever a foot stands by the usual rule. A joint without frames: wherever it stands.
 
     >>> parse_runs("lfoot, rfoot:160+52")
     (('lfoot', 0, 0), ('rfoot', 160, 52))
@@ -97,29 +97,28 @@ def _parse_entry(text: str) -> Run:
     return match["name"], int(match["first"] or 0), int(match["count"] or 0)
 
 
-def runs_of(source: SignalSource, wanted: Runs) -> tuple[Run, ...]:
-    """Requested runs, detected by the contact rule where no frames are given.
+def runs_of(source: SignalSource, runs: Runs) -> tuple[Run, ...]:
+    """Requested runs, detected by the contact rule if no frames are given.
 
-    Raises OptionError for what is beyond the clip, where angles have no known unit, and where no
-    joint is a foot.
+    Raises OptionError for frames beyond the clip, for an unknown angle unit, and without a foot.
     """
     layout = source.layout
     skeleton, n_frames = skeleton_of(NAME, layout), layout.n_frames
     if not has_kinematics(skeleton, whole=True):
         raise OptionError(f"contacts: skeleton {skeleton.name!r} has angles of an unknown unit")
-    if isinstance(wanted, str):
+    if isinstance(runs, str):
         if not find_feet(skeleton):
             raise OptionError(
                 f"contacts: no joint of skeleton {skeleton.name!r} is a foot by its name; name "
                 "those that are, like contacts=ankle_l,ankle_r"
             )
         return _detect_runs(source, skeleton, None)
-    for name, first, count in wanted:
+    for name, first, count in runs:
         _joint_index(skeleton, name)
         if first + count > n_frames:
             raise OptionError(f"contacts: {name}:{first}+{count} goes beyond {n_frames} frames")
-    given = tuple(run for run in wanted if run[2])
-    alone = [name for name, _, count in wanted if not count]
+    given = tuple(run for run in runs if run[2])
+    alone = [name for name, _, count in runs if not count]
     return (*given, *_detect_runs(source, skeleton, alone)) if alone else given
 
 
@@ -141,7 +140,7 @@ def choose_contacts(
 ) -> ContactSettings | None:
     """Contact settings that hold ``runs`` to ``tolerance``, in length units; None without runs.
 
-    Raises OptionError for a joint that is not there, or for too many.
+    Raises OptionError for an unknown joint, or for too many.
     """
     by_joint: dict[int, list[tuple[int, int]]] = {}
     for name, first, count in runs:
@@ -169,7 +168,7 @@ def choose_contacts(
 
 
 def _group_joints(skeleton: Skeleton, joints: Sequence[int]) -> list[list[int]]:
-    """Joints of which one hangs from the other, as a toe from its foot."""
+    """Joints one of which is below the other, as a toe below its foot."""
     groups: list[list[int]] = []
     for joint in joints:
         path = set(path_of(skeleton.parents, joint))

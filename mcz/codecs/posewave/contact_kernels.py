@@ -26,13 +26,13 @@ LEANING, STANDING = 1, 2  # a point before or after a contact, and in one
 
 @kernel
 def place_points(
-    plan: Plan, held: HeldPoints, lanes: Lanes, values: Floats2, positions: Floats3
+    plan: Plan, points: HeldPoints, lanes: Lanes, values: Floats2, positions: Floats3
 ) -> None:
     """Fill ``found`` (n_points, n_frames, 3) with places in frames ``values`` (n_frames, ...)."""
     for n in range(positions.shape[1]):
         place_joints(plan, values, n, lanes, 1)
-        for k in range(len(held.joints)):
-            _place_point(plan, held, k, values[n], lanes, positions[k, n])
+        for k in range(len(points.joints)):
+            _place_point(plan, points, k, values[n], lanes, positions[k, n])
 
 
 @kernel
@@ -77,7 +77,7 @@ def _lean(end: int, f: int, share: float, shifts: Floats2, active: Ints) -> None
 @kernel
 def correct_poses(
     plan: Plan,
-    held: HeldPoints,
+    held_points: HeldPoints,
     lanes: Lanes,
     values: Floats2,
     active: Ints2,
@@ -89,11 +89,11 @@ def correct_poses(
     ``active`` (n_points, n_frames) is not 0 where a point is to be ``shifts`` (n_points, n_frames,
     3) away from where it is. Points that only lean to a contact are left alone after a round.
     """
-    n_points, n_kept = len(held.joints), len(plan.joints)
+    n_points, n_kept = len(held_points.joints), len(plan.joints)
     pose, factors = np.empty((1, values.shape[1])), np.empty((1, len(plan.path)))
     points, goals = np.empty((n_points, 3)), np.empty((n_points, 3))
     pulls, square = np.zeros((3 * n_points, n_kept)), np.zeros((3 * n_points, 3 * n_points))
-    wanted, pivots = np.zeros(3 * n_points), np.zeros(3 * n_points)
+    targets, pivots = np.zeros(3 * n_points), np.zeros(3 * n_points)
     row, change, total = np.zeros(n_kept), np.zeros(n_kept), np.zeros(n_kept)
     which = np.zeros(n_points, np.int64)
     for n in range(len(values)):
@@ -111,30 +111,30 @@ def correct_poses(
             place_joints(plan, pose, 0, lanes, 1)
             for a in range(n_active):
                 k = which[a]
-                _place_point(plan, held, k, pose[0], lanes, points[k])
+                _place_point(plan, held_points, k, pose[0], lanes, points[k])
                 for i in range(3):
                     if turn == 0:
                         goals[k, i] = points[k, i] + shifts[k, n, i]
-                    wanted[3 * a + i] = goals[k, i] - points[k, i]
-                _note_pulls(plan, held, k, lanes, factor, pulls[3 * a :])
+                    targets[3 * a + i] = goals[k, i] - points[k, i]
+                _note_pulls(plan, held_points, k, lanes, factor, pulls[3 * a :])
             if turn == 0:
                 n_next = _note_active(active, n, STANDING, which)
-            _solve(pulls, wanted, square, pivots, 3 * n_active)  # HOLD-15
+            _solve(pulls, targets, square, pivots, 3 * n_active)  # HOLD-15
             for c in range(n_kept):
                 row[c] = 0.0
             for a in range(3 * n_active):
                 for c in range(n_kept):
-                    row[c] += pulls[a, c] * wanted[a]
+                    row[c] += pulls[a, c] * targets[a]
             row_out_of(plan, factor, row, change)
             for c in range(n_kept):
-                limit = held.limits[c]
+                limit = held_points.limits[c]
                 total[c] = min(max(total[c] + change[c], -limit), limit)
-                pose[0, held.columns[c]] = values[n, held.columns[c]] + total[c]
+                pose[0, held_points.columns[c]] = values[n, held_points.columns[c]] + total[c]
             n_active = n_next
             if n_active == 0:
                 break
         for c in range(n_kept):
-            values[n, held.columns[c]] = pose[0, held.columns[c]]
+            values[n, held_points.columns[c]] = pose[0, held_points.columns[c]]
 
 
 def _note_active(active: Ints2, n: int, least: int, which: Ints) -> int:
@@ -148,12 +148,12 @@ def _note_active(active: Ints2, n: int, least: int, which: Ints) -> int:
 
 
 def _place_point(
-    plan: Plan, held: HeldPoints, k: int, row: Floats, lanes: Lanes, point: Floats
+    plan: Plan, points: HeldPoints, k: int, row: Floats, lanes: Lanes, point: Floats
 ) -> None:
     """Compute the position of point ``k``, from its root on, and that of the root."""
-    joint, root = held.joints[k], held.roots[k]
+    joint, root = points.joints[k], points.roots[k]
     own, origin = lanes.axes[joint + 1], lanes.origins[joint + 1]
-    x, y, z = held.tails[k, 0], held.tails[k, 1], held.tails[k, 2]
+    x, y, z = points.tails[k, 0], points.tails[k, 1], points.tails[k, 2]
     for i in range(3):
         way = own[3 * i, 0] * x + own[3 * i + 1, 0] * y + own[3 * i + 2, 0] * z
         point[i] = origin[i, 0] + way
@@ -165,28 +165,28 @@ def _place_point(
 
 
 def _note_pulls(
-    plan: Plan, held: HeldPoints, k: int, lanes: Lanes, factor: Floats, pulls: Floats2
+    plan: Plan, points: HeldPoints, k: int, lanes: Lanes, factor: Floats, pulls: Floats2
 ) -> None:
     """Write the Jacobian of point ``k`` in the metric: three rows of J R^-1."""
-    joint = held.joints[k]
+    joint = points.joints[k]
     own, origin, motions = lanes.axes[joint + 1], lanes.origins[joint + 1], lanes.motions
-    x, y, z = held.tails[k, 0], held.tails[k, 1], held.tails[k, 2]
+    x, y, z = points.tails[k, 0], points.tails[k, 1], points.tails[k, 2]
     a = origin[0, 0] + (own[0, 0] * x + own[1, 0] * y + own[2, 0] * z)
     b = origin[1, 0] + (own[3, 0] * x + own[4, 0] * y + own[5, 0] * z)
     c = origin[2, 0] + (own[6, 0] * x + own[7, 0] * y + own[8, 0] * z)
     for i in range(3):
         for number in range(pulls.shape[1]):
             pulls[i, number] = 0.0
-    for at in range(held.starts[k], held.starts[k + 1]):
-        number = held.chains[at]
+    for at in range(points.starts[k], points.starts[k + 1]):
+        number = points.chains[at]
         motion = motions[number]
         u, v, w = motion[0, 0], motion[1, 0], motion[2, 0]
         pulls[0, number] = motion[3, 0] + (v * c - w * b)
         pulls[1, number] = motion[4, 0] + (w * a - u * c)
         pulls[2, number] = motion[5, 0] + (u * b - v * a)
     for i in range(3):
-        for back in range(held.starts[k + 1] - held.starts[k]):
-            number = held.chains[held.starts[k + 1] - 1 - back]
+        for back in range(points.starts[k + 1] - points.starts[k]):
+            number = points.chains[points.starts[k + 1] - 1 - back]
             last = plan.starts[number + 1] - 1
             pull = min(max(pulls[i, number], -GREATEST_PULL), GREATEST_PULL)
             for at in range(plan.starts[number], last):
@@ -194,7 +194,7 @@ def _note_pulls(
             pulls[i, number] = min(max(pull * factor[last], -GREATEST_PULL), GREATEST_PULL)
 
 
-def _solve(pulls: Floats2, wanted: Floats, square: Floats2, pivots: Floats, n: int) -> None:
+def _solve(pulls: Floats2, solution: Floats, square: Floats2, pivots: Floats, n: int) -> None:
     """Solve (pulls pulls' + damping) x = wanted by L D L'; ``wanted`` is overwritten."""
     trace = 0.0
     for i in range(n):
@@ -215,9 +215,9 @@ def _solve(pulls: Floats2, wanted: Floats, square: Floats2, pivots: Floats, n: i
             else:
                 square[i, k] = entry / pivots[k]
         for k in range(i):
-            wanted[i] -= square[i, k] * wanted[k]
+            solution[i] -= square[i, k] * solution[k]
     for back in range(n):
         i = n - 1 - back
-        wanted[i] = wanted[i] / pivots[i]
+        solution[i] = solution[i] / pivots[i]
         for k in range(i + 1, n):
-            wanted[i] -= square[k, i] * wanted[k]
+            solution[i] -= square[k, i] * solution[k]

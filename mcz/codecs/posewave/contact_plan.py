@@ -22,7 +22,7 @@ from mcz.model.schema import UVARINT, Record, bounded, counted, field
 MAX_POINTS = 8
 MAX_ROUNDS = 6
 MAX_RAMP = 64
-START_UNITS = 16  # of a step, in which the place is told that a contact begins with
+START_UNITS = 16  # of a step, for the place at which a contact begins
 MOST_STEPS = 4.0  # greatest steps by which a channel may be corrected
 
 
@@ -57,7 +57,7 @@ class ContactsFields(Record):
 class Contacts:
     """The fields of ContactsFields, checked against a skeleton.
 
-    ``joints`` and ``steps`` of the points, and their places ``tails`` (n_points, 3) along the
+    ``joints`` and ``steps`` of the points, and their positions ``tails`` (n_points, 3) along the
     joint's B. ``follows``: the number of another point, from 1, or 0.
     """
 
@@ -70,12 +70,12 @@ class Contacts:
 
 
 class HeldPoints(NamedTuple):
-    """The points of contacts in a segment, as the kernels want them.
+    """The points of contacts in a segment, for the kernels.
 
     ``joints`` (n_points,) and ``tails`` (n_points, 3), along the joint's B; ``roots`` (n_points,)
-    are the joints that they hang from. ``chains`` are the kept channels that move a point,
-    ascending, those of point k from ``starts[k]`` on. ``limits`` (n_kept,): how far a channel may
-    be corrected; ``columns`` (n_kept,).
+    are their root joints. ``chains`` are the kept channels that move a point, ascending, those of
+    point k from ``starts[k]`` on. ``limits`` (n_kept,): greatest correction of a channel;
+    ``columns`` (n_kept,).
     """
 
     joints: Ints
@@ -90,7 +90,7 @@ class HeldPoints(NamedTuple):
 def parse_contacts(
     fields: Sequence[ContactsFields], skeleton: Skeleton, where: str
 ) -> Contacts | None:
-    """Raises FormatError where the fields do not fit the skeleton."""
+    """Check the fields; raises FormatError where they do not fit the skeleton."""
     for record in fields:
         if not record.points:  # HOLD-03
             raise FormatError(f"{where}: contacts of no point")

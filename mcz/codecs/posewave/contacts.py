@@ -1,7 +1,8 @@
 """Contacts: frames in which a point keeps the displacement that it has in the source.
 
-SPEC.md, "Held contacts", is normative. They come after the finest details. A stream tells how a
-point moves, on a fine grid, and a decoder changes the pose as little as it can to put it there.
+SPEC.md, "Held contacts", is normative. They follow the finest details. A stream codes the
+displacements of points on a fine grid, and a decoder changes the pose as little as possible to meet
+them.
 """
 
 from __future__ import annotations
@@ -28,17 +29,17 @@ if TYPE_CHECKING:  # compiled kernels, imported on first use
 
 
 USUAL = 0.25, -0.125, 0.0625, 0.0, 0.6875, 0.125, -0.25, 0.75, 0.1875
-# Of a mean magnitude, class by class: how likely one is not 0, and how likely it is greater yet.
+# By class of a mean magnitude: probability that one is not 0, and that it is greater still.
 SOME = (
     *(3840, 7424, 11008, 15616, 21760, 29184, 36864, 44544),
     *(50688, 55296, 58624, 60928, 62464, 63488, 64256, 64512),
 )
-MORE = (
+MORE_PROBABILITY = (
     *(2048, 4096, 5888, 8960, 13056, 18688, 25856, 33536),
     *(41216, 47872, 52992, 56832, 59648, 61440, 62720, 63744),
 )
 ROOM = 64  # bytes of a frame
-CERTAIN = 8  # as if each had been seen so often
+CERTAIN = 8  # initial count of observations
 WEIGHT = 26214  # of each opinion, in 2^-16
 
 
@@ -64,13 +65,13 @@ def _mixing() -> ModuleType:
 
 
 class Coder:
-    """Codes contacts behind the rows of a stream, with contexts of its own."""
+    """Codes contacts after the rows of a stream, with contexts of its own."""
 
     def __init__(self, stream: Stream) -> None:
         coding, mixing = _coding(), _mixing()
         self.stream = stream
         models = np.tile(np.array([32768, 0], np.int64), coding.N_CONTEXTS)
-        likely = np.repeat(np.array([MORE], np.int64).T, coding.N_BITS, axis=1)
+        likely = np.repeat(np.array([MORE_PROBABILITY], np.int64).T, coding.N_BITS, axis=1)
         likely[:, 0] = SOME
         for first in (coding.C_FAST, coding.C_SLOW, coding.C_OTHER):
             own = slice(2 * first, 2 * (first + likely.size))
@@ -100,11 +101,11 @@ class Coder:
         step: float,
         track: Track,
         leader: Leader,
-        wanted: Floats,
+        target: Floats,
         radii: Floats,
     ) -> int:
         """Code the contacts of a point in place; -1, or the frame of one that is impossible."""
-        args = self.learner, places, step, track, leader, wanted, radii
+        args = self.learner, places, step, track, leader, target, radii
         return int(_coding().code_point(self.state, self.stream.data, *args))
 
     def close(self) -> None:
@@ -116,12 +117,12 @@ class Corrections:
     """Decoded point positions, and their corrections by contacts.
 
     By point and frame: ``places`` (..., 3), in length units, ``stands``, ``starts`` (..., 3) and
-    ``moves`` (..., 3), as ``displacement_kernels`` has them, ``shifts`` (..., 3) and ``active`` as
+    ``moves`` (..., 3), as in ``displacement_kernels``, ``shifts`` (..., 3) and ``active`` as in
     ``contact_kernels``.
     """
 
-    def __init__(self, contacts: Contacts, plan: Plan, held: HeldPoints, values: Floats) -> None:
-        self.contacts, self.plan, self.held, self.values = contacts, plan, held, values
+    def __init__(self, contacts: Contacts, plan: Plan, points: HeldPoints, values: Floats) -> None:
+        self.contacts, self.plan, self.held, self.values = contacts, plan, points, values
         self.lanes = _kernels().lanes_of(plan, 1)
         self.places = self.positions_of(values)
         self.stands = np.zeros(self.places.shape[:2], np.int64)
@@ -140,22 +141,22 @@ class Corrections:
         result: Track = _coding().Track(self.stands[point], self.starts[point], self.moves[point])
         return result
 
-    def code(self, coder: Coder, point: int, wanted: Floats, radii: Floats) -> int:
-        """Code one point, as ``Coder.point`` does."""
+    def code(self, coder: Coder, point: int, target: Floats, radii: Floats) -> int:
+        """Code one point, as ``Coder.point``."""
         contacts, places = self.contacts, self.places[point]
         step, followed = contacts.steps[point], contacts.follows[point] - 1
         leader = _coding().Leader(np.zeros(len(places), np.int64), self.shifts[0])
         if followed >= 0:
             leader = _coding().Leader(self.stands[followed], self.shifts[followed])
         padded = np.pad(places, ((1, 1), (0, 0)), "edge")
-        fault = coder.point(padded, step, self.track(point), leader, wanted, radii)
+        fault = coder.point(padded, step, self.track(point), leader, target, radii)
         goal = self.shifts[point], self.active[point]
         goal[0][:], goal[1][:] = 0.0, 0
         _kernels().set_shifts(places, self.track(point), step, contacts.ramp, *goal)
         return fault
 
     def correct(self) -> None:
-        """Change the values so that the points are where they should be."""
+        """Move the points to their places by changing the values."""
         args = self.held, self.lanes, self.values, self.active, self.shifts, self.contacts.rounds
         _kernels().correct_poses(self.plan, *args)
 
@@ -166,10 +167,10 @@ def room_of_contacts(contacts: Contacts | None, n_frames: int) -> int:
 
 
 def decode_contacts(
-    contacts: Contacts, plan: Plan, held: HeldPoints, stream: Stream, values: Floats, where: str
+    contacts: Contacts, plan: Plan, points: HeldPoints, stream: Stream, values: Floats, where: str
 ) -> None:
     """Correct ``values`` (n_frames, n_channels) in place."""
-    corrections, coder = Corrections(contacts, plan, held, values), Coder(stream)
+    corrections, coder = Corrections(contacts, plan, points, values), Coder(stream)
     nothing = np.zeros((1, 3)), np.zeros(1)
     for point in range(len(contacts.joints)):
         fault = corrections.code(coder, point, *nothing)
@@ -183,10 +184,10 @@ def decode_contacts(
     corrections.correct()
 
 
-SLACK = 0.02  # of the tolerance that is left to the decoder's last round
-TRIALS = 10  # of a segment, with less room for displacements where a point was off
+SLACK = 0.02  # of the tolerance, reserved for the decoder's last round
+TRIALS = 10  # of a segment, with less room for displacements after a miss
 LESS_ROOM = 0.7
-COUNTERED = 0.5  # of what a point is off
+COUNTERED = 0.5  # of the error of a point
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,8 +195,8 @@ class Piece:
     """Frames of a contact: of a segment or, before, of a clip.
 
     ``point`` is its number in the header, ``origin`` the first frame of the whole contact, a frame
-    of the clip. ``stance``: pieces of the same number are contacts of a foot that do not all end
-    before another begins; all are shifted alike, so that parts of a foot fit each other.
+    of the clip. ``stance``: pieces of the same number are contacts of a foot that overlap in time;
+    all are shifted alike, so that parts of a foot fit each other.
     """
 
     point: int
@@ -226,8 +227,8 @@ class Outcome:
 class ContactTracker:
     """Contacts of a clip as an encoder tracks them: pieces, and their target positions.
 
-    ``shifts`` are how far the place that is held is off the source's, by stance, with the frame in
-    which that was found.
+    ``shifts`` are the distances of the held place from the source's, by stance, with the frame in
+    which they were measured.
     """
 
     tolerance: float = 0.0
@@ -241,17 +242,17 @@ class ContactTracker:
         self,
         contacts: Contacts,
         plan: Plan,
-        held: HeldPoints,
+        points: HeldPoints,
         stream: Stream,
         source: Floats,
         values: Floats,
     ) -> None:
         """Code the pieces in the segment and correct ``values`` as a decoder will."""
-        # What another trial of these frames has left does not count.
+        # Results of another trial of these frames do not count.
         self.shifts = {key: x for key, x in self.shifts.items() if x[0] < self.first}
         self.outcomes = [done for done in self.outcomes if done.piece.first < self.first]
-        pieces = self._within(len(values))
-        corrections = Corrections(contacts, plan, held, values.copy())
+        pieces = self._pieces_within(len(values))
+        corrections = Corrections(contacts, plan, points, values.copy())
         targets = corrections.positions_of(source)
         self._choose_shifts(corrections, pieces, targets)
         radii = np.full(targets.shape[:2], (1.0 - 2 * SLACK) * self.tolerance)
@@ -267,7 +268,7 @@ class ContactTracker:
             for outcome in outcomes:
                 piece, missed = outcome.piece, outcome.errors > self.tolerance
                 rows = slice(piece.first, piece.stop)
-                radii[:, rows][:, missed] *= LESS_ROOM  # of others, too, which may be fastened
+                radii[:, rows][:, missed] *= LESS_ROOM  # of others too, which may be fastened
                 aims[piece.point, rows][missed] -= COUNTERED * outcome.off[missed]
         coder.close()
         values[:] = corrections.values
@@ -277,7 +278,7 @@ class ContactTracker:
             self.outcomes.append(replace(outcome, piece=clip_piece))
 
     def warn(self, skeleton: Skeleton, contacts: Contacts) -> None:
-        """Say of which joints displacements are off by more than the tolerance."""
+        """Warn of joints whose displacements are off by more than the tolerance."""
         missed: dict[int, list[Outcome]] = {}
         for outcome in self.outcomes:
             if not outcome.errors.max() <= self.tolerance:
@@ -291,7 +292,7 @@ class ContactTracker:
             )
             warn(f"{message}{first} to {last}", ContactWarning, stacklevel=2)
 
-    def _within(self, n_frames: int) -> list[Piece]:
+    def _pieces_within(self, n_frames: int) -> list[Piece]:
         clipped = []
         for piece in self.pieces:
             first = max(piece.first - self.first, 0)
@@ -325,10 +326,10 @@ class ContactTracker:
     ) -> Coder:
         """Code the pieces, their points as near to ``targets`` as ``radii`` allow.
 
-        ``aims`` are how far beside them an encoder aims, to counter what others do.
+        ``aims`` are offsets of an encoder's targets, to counter the effect of other points.
         """
         coder = Coder(stream)
-        wanted = np.zeros(targets.shape)
+        shifts = np.zeros(targets.shape)
         for array in (corrections.stands, corrections.starts, corrections.moves):
             array[:] = 0
         for piece in pieces:
@@ -339,11 +340,11 @@ class ContactTracker:
             goal = targets[point, rows] + self.shifts[piece.stance][1]
             here = corrections.places[point, first]
             corrections.starts[point, first] = np.rint((goal[0] - here) / unit)
-            wanted[point, rows] = (
+            shifts[point, rows] = (
                 goal + aims[point, rows] - (here + corrections.starts[point, first] * unit)
             )
         for point in range(len(targets)):
-            fault = corrections.code(coder, point, wanted[point], radii[point])
+            fault = corrections.code(coder, point, shifts[point], radii[point])
             if fault >= 0:
                 raise MotionError(
                     f"contacts: from frame {self.first + fault} on a point moves or is off by more "

@@ -99,12 +99,12 @@ def code_error(model: Model, data: Bytes, error: int, where: Contexts) -> int:
     far = mixed(model.coder, data, far, M_SIGN + where[LEVEL], signs[0], signs[1], signs[2])
     model.at[0] += far * N_SLOTS
     size = abs(error)
-    bucket, found = bucket_of(size), 1
-    while found < N_SLOTS:
-        if code_decision(model, data, 1 if bucket > found else 0, found, where) == 0:
+    bucket, coded_size = bucket_of(size), 1
+    while coded_size < N_SLOTS:
+        if code_decision(model, data, 1 if bucket > coded_size else 0, coded_size, where) == 0:
             break
-        found += 1
-    size = code_rest(model.coder, data, size, found, where[LEVEL])
+        coded_size += 1
+    size = code_rest(model.coder, data, size, coded_size, where[LEVEL])
     return -size if far ^ where[DOWN] ^ 1 else size
 
 
@@ -127,13 +127,13 @@ def code_rest(coder: Ints, data: Bytes, size: int, bucket: int, level: int) -> i
         top = adaptive(coder, data, rest >> (n - 1) & 1, C_EXTRA + bucket)
         return low + (top << (n - 1)) + number(coder, data, rest, n - 1)
     rest = size - FIRST_ESCAPED + 1
-    length, found = bits(max(rest, 0)), 1
-    while found < MOST_LENGTH:
-        context = C_ESCAPE + level * MOST_LENGTH + found
-        if adaptive(coder, data, 1 if length > found else 0, context) == 0:
+    length, coded_rest = bits(max(rest, 0)), 1
+    while coded_rest < MOST_LENGTH:
+        context = C_ESCAPE + level * MOST_LENGTH + coded_rest
+        if adaptive(coder, data, 1 if length > coded_rest else 0, context) == 0:
             break
-        found += 1
-    rest = 1 << (found - 1) | number(coder, data, rest, found - 1)
+        coded_rest += 1
+    rest = 1 << (coded_rest - 1) | number(coder, data, rest, coded_rest - 1)
     return FIRST_ESCAPED - 1 + rest
 
 
@@ -150,13 +150,13 @@ def cost_of(model: Model, error: int, where: Contexts) -> int:
     chance = mixed_chance(model.coder, M_SIGN + where[LEVEL], signs)
     total += costs[(chance if far else 65536 - chance) >> 4]
     model.at[0] += far * N_SLOTS
-    bucket, found = bucket_of(abs(error)), 1
-    while found < N_SLOTS:
-        _, chance, _ = predict_bit(model, found, one[found], other[found], second[found])
-        total += costs[(chance if bucket > found else 65536 - chance) >> 4]
-        if bucket <= found:
+    bucket, cost = bucket_of(abs(error)), 1
+    while cost < N_SLOTS:
+        _, chance, _ = predict_bit(model, cost, one[cost], other[cost], second[cost])
+        total += costs[(chance if bucket > cost else 65536 - chance) >> 4]
+        if bucket <= cost:
             break
-        found += 1
+        cost += 1
     model.at[0] -= far * N_SLOTS
     if bucket >= 5:
         plain = (bucket - 3) >> 1 if bucket < N_SLOTS else 2 * bits(abs(error))

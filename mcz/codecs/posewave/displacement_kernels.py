@@ -81,7 +81,7 @@ def code_point(
     step: float,
     contacts: Track,
     leader: Leader,
-    wanted: Floats2,
+    target: Floats2,
     radii: Floats,
 ) -> int:
     """Code the contacts of a point, in place; -1, or the frame where one is impossible.
@@ -96,10 +96,10 @@ def code_point(
     for f in range(n_frames + 2):
         for i in range(3):
             place[f, i] = places[f, i] / step
-    goals, anchor = np.zeros((len(wanted), 3)), np.zeros(3)
-    for f in range(len(wanted)):
+    goals, anchor = np.zeros((len(target), 3)), np.zeros(3)
+    for f in range(len(target)):
         for i in range(3):
-            goals[f, i] = wanted[f, i] / step
+            goals[f, i] = target[f, i] / step
     count = 0
     if state[ENCODING]:
         for f in range(n_frames):
@@ -172,12 +172,12 @@ def _code_move(state: Ints, data: Bytes, learner: Learner, last: Ints, move: Int
         unit = 1 if axis == 0 else 2
         side = int(np.floor((mean - middle) * 4.0 / unit)) + 2  # 0 to 4
         residual = (move[axis] - middle) // unit
-        found = _code_residual(state, data, residual, learner.sizes[axis], other, side)
-        move[axis] = middle + unit * found
+        coded = _code_residual(state, data, residual, learner.sizes[axis], other, side)
+        move[axis] = middle + unit * coded
         if abs(move[axis]) > MAX_DISPLACEMENT:  # HOLD-13
             return 1
         odd = move[0] & 1
-        size = float(min(abs(found), 1024))
+        size = float(min(abs(coded), 1024))
         other = size if axis == 0 else 0.5 * (other + size)
         learner.sizes[axis, 0] += (size - learner.sizes[axis, 0]) * 0.25
         learner.sizes[axis, 1] += (size - learner.sizes[axis, 1]) * 0.03125
@@ -271,15 +271,15 @@ def _solve(squares: Floats2, products: Floats, solution: Floats, scratch: Floats
         solution[i] = entry
 
 
-def _choose(learner: Learner, before: Ints, wanted: Floats, radius: float, chosen: Ints) -> None:
+def _choose(learner: Learner, before: Ints, target: Floats, radius: float, chosen: Ints) -> None:
     """Choose the cheapest displacement near ``wanted``, given the expected one."""
     best = -1.0
     for place in range(54):
         odd = place // 27
-        x = 2 * int(np.floor((wanted[0] - odd) * 0.5 + 0.5)) + odd + 2 * (place % 3 - 1)
-        y = _nearest(wanted[1], 1, odd) + 2 * (place // 3 % 3 - 1)
-        z = _nearest(wanted[2], 2, odd) + 2 * (place // 9 % 3 - 1)
-        a, b, c = wanted[0] - x, wanted[1] - y, wanted[2] - z
+        x = 2 * int(np.floor((target[0] - odd) * 0.5 + 0.5)) + odd + 2 * (place % 3 - 1)
+        y = _nearest(target[1], 1, odd) + 2 * (place // 3 % 3 - 1)
+        z = _nearest(target[2], 2, odd) + 2 * (place // 9 % 3 - 1)
+        a, b, c = target[0] - x, target[1] - y, target[2] - z
         off = a * a + b * b + c * c
         cost = abs(x - before[0] - learner.means[0]) / (1.0 + learner.sizes[0, 0])
         cost += abs(y - before[1] - learner.means[1]) / (2.0 + 2.0 * learner.sizes[1, 0])
@@ -293,11 +293,11 @@ def _choose(learner: Learner, before: Ints, wanted: Floats, radius: float, chose
 
 def _class_of(size: float) -> int:
     """0 to 15, about two to an octave of a mean magnitude."""
-    found, limit = 0, 0.1
-    while size > limit and found < N_SIZES - 1:
+    index, limit = 0, 0.1
+    while size > limit and index < N_SIZES - 1:
         limit = limit * 1.5
-        found += 1
-    return found
+        index += 1
+    return index
 
 
 def _code_residual(

@@ -1,4 +1,4 @@
-"""Exact channels of ``posewave``: groups of ordinals beside the rows, each a signal of fast.
+"""Exact channels of ``posewave``: groups of ordinals besides the rows, each a signal of fast.
 
 SPEC.md, "Exact channels", is normative.
 """
@@ -44,7 +44,7 @@ def joint_words(text: object) -> tuple[str, ...]:
 
 
 def partition(skeleton: Skeleton, options: Params) -> tuple[Groups, tuple[int, ...]] | None:
-    """The groups of a clip and the numbers of the exact ones; None where no joint is exact."""
+    """The groups of a clip and the numbers of the exact ones; None without exact joints."""
     words = options.get(OPTION)
     if words is None:
         return None
@@ -56,7 +56,7 @@ def partition(skeleton: Skeleton, options: Params) -> tuple[Groups, tuple[int, .
 
 
 def groups_of(skeleton: Skeleton, joints: Collection[int]) -> tuple[Groups, tuple[int, ...]]:
-    """Each of these joints is a group, and so are the channels of others from one to the next.
+    """Groups: each of these joints, and the channels of other joints between them.
 
     Also returns the numbers of the groups of these joints.
     """
@@ -70,7 +70,7 @@ def groups_of(skeleton: Skeleton, joints: Collection[int]) -> tuple[Groups, tupl
 def cut_header(
     header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int, ...]
 ) -> bytes:
-    """Exact groups can be left alone; rows, of which all lossy joints have a part, cannot be cut.
+    """The header of a cut: exact groups can be cut, rows, which all lossy joints share, cannot.
 
     Raises OptionError for other groups.
     """
@@ -88,7 +88,7 @@ def cut_header(
 
 
 def most_frames(layout: Layout, groups: Sequence[int]) -> int:
-    """Frames of a segment in which these groups can be exact."""
+    """Greatest number of frames of a segment in which these groups can be exact."""
     widest = max((len(layout.groups[group]) for group in groups), default=1)
     return min(MOST_ROWS, MOST_VALUES // widest)
 

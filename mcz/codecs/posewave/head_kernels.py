@@ -33,10 +33,10 @@ def code_head(
         before = adaptive(state, data, kept[c], first + C_KEPT + 2 * classes[c] + before)
         kept[c] = before  # PWAVE-18
         own = 2 * classes[c] + before
-        found = code_number(state, data, first, own, numbers[c])
-        if abs(found) >= 1 << MAX_LENGTH:
+        number = code_number(state, data, first, own, numbers[c])
+        if abs(number) >= 1 << MAX_LENGTH:
             return 1
-        numbers[c] = found
+        numbers[c] = number
     return 0
 
 

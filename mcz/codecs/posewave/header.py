@@ -30,7 +30,7 @@ from mcz.model.motion import (
 from mcz.model.schema import (
     UVARINT,
     Checked,
-    CheckedBeside,
+    CheckedInRecord,
     Record,
     bounded,
     build,
@@ -45,7 +45,7 @@ NAME = "posewave"
 MAX_LEVELS = 8
 MAX_FINE = 24
 WHOLE_SHARE, SPREADS = 16, 32  # of ``shell``
-START_TABLES = 16  # of ``start``: room for as many
+START_TABLES = 16  # of ``start``: reserved number
 REFINING, WHOLE_TURNS = 1, 2  # of ``flags``
 
 
@@ -61,7 +61,7 @@ class PosewaveHeader(Record):
 
     levels: int = field(bounded(Int8ul, 0, MAX_LEVELS), "levels, 0 to 8")  # PWAVE-05
     borrowing: int = field(
-        CheckedBeside(Int8ul, lambda n, fields: n <= fields.levels),
+        CheckedInRecord(Int8ul, lambda n, fields: n <= fields.levels),
         "finest levels of details that take the metric of the next coarser one",
     )  # PWAVE-06
     start: int = field(
@@ -116,11 +116,10 @@ class PosewaveHeader(Record):
 class Header:
     """The fields of PosewaveHeader, checked against a layout.
 
-    Arrays are by channel, but for ``weights`` (n_joints,): ``greatest`` steps and the step of the
+    Arrays are by channel, except ``weights`` (n_joints,): ``greatest`` steps and the step of the
     ``first`` value of a segment and of a ``constant``, in source units. ``whole``: quaternions and
     rotation vectors turn in the metric, and the latter's channels are rotations. ``orders``: codes
-    by joint. ``exact`` (n_channels,): whether a channel is; ``exact_groups`` are
-    their groups.
+    by joint. ``exact`` (n_channels,): mask of exact channels; ``exact_groups`` are their groups.
     """
 
     levels: int
@@ -167,8 +166,8 @@ def build_header(**fields: Any) -> bytes:
     return build(PosewaveHeader(**{"contacts": [], **fields}), f"{NAME} header")
 
 
-def parse_header(header: bytes, layout: Layout) -> Header:
-    """Raises FormatError where ``header`` does not fit the skeleton of ``layout``."""
+def parse_posewave_header(header: bytes, layout: Layout) -> Header:
+    """Parse a header; raises FormatError where it does not fit the skeleton of ``layout``."""
     fields = parse(PosewaveHeader, header, f"{NAME} header")
     skeleton = layout.skeleton
     if skeleton is None:  # PWAVE-04
@@ -195,9 +194,9 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         if len(codes) not in (0, due):  # PWAVE-13, PWAVE-14
             raise FormatError(f"{NAME}: {len(codes)} of {name}, {due} are due")
     orders = _orders(fields.orders, skeleton)
-    exact = _exact(fields.exact, layout)
+    exact = _exact_mask(fields.exact, layout)
     if fields.exact and fields.contacts:  # PWAVE-39
-        raise FormatError(f"{NAME}: contacts beside exact channels")
+        raise FormatError(f"{NAME}: contacts and exact channels")
     plain = iter(fields.plain or [code_of(1.0)] * n_plain)
     rotation, position = ratio_of(fields.rotation), ratio_of(fields.position)
     greatest = np.array(
@@ -262,11 +261,11 @@ def _spread(octaves: int) -> float:
     return 2.0 ** (octaves - 10) if octaves else 0.0
 
 
-def _exact(groups: Sequence[int], layout: Layout) -> Bools:
+def _exact_mask(groups: Sequence[int], layout: Layout) -> Bools:
     exact, last = np.zeros(layout.n_channels, np.bool_), len(layout.groups) - 1
     for before, group in pairwise([-1, *groups]):
         if group <= before:  # PWAVE-32
-            raise FormatError(f"{NAME}: group {group} is exact, named behind {before}")
+            raise FormatError(f"{NAME}: exact group {group} after {before}")
         if group > last:  # PWAVE-33
             raise FormatError(f"{NAME}: group {group} is exact, the last is {last}")
         exact[list(layout.groups[group])] = True

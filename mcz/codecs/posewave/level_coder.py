@@ -1,7 +1,7 @@
 """Levels of a segment: from rows in the metric to values, level by level, coarse to fine.
 
-SPEC.md, "Codec 3: posewave", is normative. Encoder and decoder go the same way: each level's rows
-are coded at the pose that a decoder has by then, so an encoder decodes what it has just coded.
+SPEC.md, "Codec 3: posewave", is normative. Encoder and decoder do the same: each level's rows are
+coded at the pose that a decoder has by then, so an encoder decodes its own output.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mcz.codecs.transforms import lifting
 from mcz.model.motion import Skeleton
 from mcz.model.types import Bools, Floats, Ints
 
-Code = Callable[[int, Floats], Floats]  # (first row, rows wanted) -> rows as a decoder has them
+Code = Callable[[int, Floats], Floats]  # (first row, rows to code) -> rows as a decoder has them
 
 BLOCK_ENTRIES = 2**21  # numbers of factors that are in memory at a time
 
@@ -41,7 +41,7 @@ def midpoints(approx: Floats, n_rows: int) -> Floats:
 
 
 class LevelCoder:
-    """Goes through the levels of a segment, coarse to fine, from rows that are in the metric."""
+    """Codes the levels of a segment, coarse to fine, from rows in the metric."""
 
     def __init__(
         self, header: Header, skeleton: Skeleton, pyramid: Pyramid, kept: Bools, first: Floats
@@ -50,7 +50,7 @@ class LevelCoder:
         self.header, self.pyramid, self.still = header, pyramid, first
         self.kept = np.flatnonzero(kept)
         self.usual = Metric(header, skeleton, kept, first)
-        self.metric = self._metric_of(0)  # that of the level at hand
+        self.metric = self._metric_of(0)  # of the present level
         self.poses = self.approx = np.zeros((0, len(self.kept)))
         self.lanes = kernels().lanes_of(self.metric.plan, 1)
         self.course = kernels().course_of(first, self.kept, header.greatest[self.kept])
@@ -73,7 +73,7 @@ class LevelCoder:
         return make_held_points(contacts, self.usual.plan, self.kept, greatest)
 
     def _metric_of(self, level: int) -> Metric:
-        """Metric of a level; coarse ones are stiffer, for their poses say less of the frames."""
+        """Metric of a level; coarse ones are stiffer, since their poses are less certain."""
         if not self.header.spread:
             return self.usual
         return self.usual.with_stiffness(self.pyramid.root(level))  # PWAVE-21, PWAVE-22
@@ -90,8 +90,8 @@ class LevelCoder:
         self.approx = np.empty((len(rows), len(self.kept)))
         for m, row in enumerate(rows):
             kernels().next_factor(self.metric.plan, self.lanes, course, factor)
-            wanted = self.metric.to_metric(factor, (row - course.expected)[None]) / steps[m]
-            kernels().take_row(self.metric.plan, course, factor, code(m, wanted) * steps[m])
+            coefficients = self.metric.to_metric(factor, (row - course.expected)[None]) / steps[m]
+            kernels().take_row(self.metric.plan, course, factor, code(m, coefficients) * steps[m])
             self.approx[m] = course.pose[0, self.kept]
 
     def take_coarsest(self, level: int, rows: Floats, exponents: Ints) -> None:
@@ -103,8 +103,10 @@ class LevelCoder:
     def code_details(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
         """Encode a level of details, all rows at once; ``code`` returns the decoded rows."""
         which = self._poses_of(level)
-        wanted = self._map_rows(self.metric.to_metric, which, rows) / self.steps(level, exponents)
-        self._add(level, which, code(0, wanted), exponents)
+        coefficients = self._map_rows(self.metric.to_metric, which, rows) / self.steps(
+            level, exponents
+        )
+        self._add(level, which, code(0, coefficients), exponents)
 
     def take_details(self, level: int, rows: Floats, exponents: Ints) -> None:
         """A level of details from its rows in the metric, in steps."""
@@ -116,7 +118,7 @@ class LevelCoder:
         self.approx = lifting.join(self.approx, nothing)
 
     def _poses_of(self, level: int) -> Ints:
-        """Pose number of each row, a coarser level's where borrowed."""
+        """Pose number of each row, a coarser level's if borrowed."""
         pyramid = self.pyramid
         n_rows = pyramid.rows(level)
         if pyramid.depth(level) > pyramid.borrowing:  # PWAVE-22
@@ -175,7 +177,7 @@ class Pyramid:
         return float(2 ** (octaves // 2)) * (ROOT_2 if octaves % 2 else 1.0)
 
     def exponents(self, level: int, refinement: Ints) -> Ints:
-        """The exponent of each row: the greatest that ``refinement`` asks of frames it bears on.
+        """The exponent of each row: the greatest ``refinement`` of the frames that it affects.
 
         ``refinement`` (n_frames,).
         """

@@ -1,7 +1,7 @@
-"""The model with which the levels of a clip are coded, as it starts, and its priors.
+"""The initial model for coding the levels of a clip, and its priors.
 
-SPEC.md, "Rows in the metric" and its annexes, are normative. Priors tell how channels of well-known
-skeletons move together; ``tools/train_priors.py`` made them.
+SPEC.md, "Rows in the metric" and its annexes, are normative. Priors describe how channels of
+well-known skeletons move together; ``tools/train_priors.py`` computed them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ N_SECOND = 33
 START_ENERGY = 500.0
 
 N_LOGS = 1024
-VARIANCE = 2.0  # of a channel of which nothing is known
+VARIANCE = 2.0  # initial, of a channel
 N_MIXER_WEIGHTS = mixing.MODELS - mixing.WEIGHTS
 
 
@@ -115,7 +115,7 @@ def wide_of(n_channels: int) -> int:
 def new_rows(n_rows: int, n_channels: int) -> Floats:
     """Magnitudes and values of the rows of a level, as ``code_rows`` takes them for ``here``.
 
-    Three rows of zeros are in front; ``[3:]`` is what a finer level takes for ``parent``.
+    Three rows of zeros are in front; ``[3:]`` is the ``parent`` of a finer level.
     """
     return np.zeros((n_rows + 3, 2 * wide_of(n_channels)))
 
@@ -130,9 +130,9 @@ def make_model(
 ) -> Model:
     """The model for channels of these ``classes`` (n,), before the first level.
 
-    A class is 0 for what is no rotation; 1 for a rotation of a root; otherwise by the joints of the
-    subtree below the channel's joint, that one counted: 2 for one, 3 up to 3, 4 up to 7, 5 beyond.
-    ``coder`` is a state that has been used already, for what comes before the rows; ``prior`` is of
+    A class is 0 for channels other than rotations; 1 for a rotation of a root; otherwise by the
+    joints of the subtree from the channel's joint on: 2 for one, 3 up to 3, 4 up to 7, 5 beyond.
+    ``coder`` is a state that is already in use, for the parts before the rows; ``prior`` is of
     these channels.
     """
     n, wide = len(classes), wide_of(len(classes))
@@ -163,7 +163,7 @@ def make_model(
         costs=cost_table(),
         columns=columns,
         variances=variances,
-        seen=np.full(1, 0.0 if prior is None else SEEN),
+        seen=np.full(1, 0.0 if prior is None else PRIOR_ROWS),
         means=np.zeros(BLOCK),
         taps=start.taps.copy(),
         tap_energy=np.full((2 * N_LEVELS, N_TAPS), START_ENERGY),
@@ -208,12 +208,12 @@ def log_table() -> Ints:
 
 @cache
 def cost_table() -> Ints:
-    """4096 times the bits that an event of probability (k + 1/2) / 4096 takes: for encoders."""
+    """4096 times the bits of an event of probability (k + 1/2) / 4096: for encoders."""
     bits = [round(-4096 * math.log2((k + 0.5) / 4096)) for k in range(4096)]
     return np.array([*bits, 0], np.int64)
 
 
-SEEN = 25.0  # rows that a prior counts for
+PRIOR_ROWS = 25.0  # rows that a prior counts for
 UNITS = 64  # of a number of L
 VARIANCE_UNITS = 16
 
@@ -221,7 +221,7 @@ VARIANCE_UNITS = 16
 class Prior(NamedTuple):
     """L D L' of the rows of a skeleton.
 
-    ``lower`` (n, n) is L, of which what lies on and above the diagonal is 0; ``variances`` (n,).
+    ``lower`` (n, n) is L, with zeros on and above the diagonal; ``variances`` (n,).
     """
 
     lower: Floats

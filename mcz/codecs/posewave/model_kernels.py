@@ -146,12 +146,12 @@ def code_rows(
 
 def code_exponent(coder: Ints, data: Bytes, exponent: int, earlier: int) -> int:
     """Code the refinement of a row in octaves; ``earlier``: that of the row before."""
-    at, found = C_EXPONENT + MAX_EXPONENT * earlier, 0
-    while found < MAX_EXPONENT:
-        if adaptive(coder, data, 1 if exponent > found else 0, at + found) == 0:
+    at, coded = C_EXPONENT + MAX_EXPONENT * earlier, 0
+    while coded < MAX_EXPONENT:
+        if adaptive(coder, data, 1 if exponent > coded else 0, at + coded) == 0:
             break
-        found += 1
-    return found
+        coded += 1
+    return coded
 
 
 def flag_contexts(

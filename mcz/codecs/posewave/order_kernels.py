@@ -21,17 +21,17 @@ LATE = 0.75  # of a turn: so far from the source an encoder tells a turn
 
 
 @kernel
-def reorder_axes(angles: Floats2, given: Ints, wanted: Ints, rule: Rule) -> None:
+def reorder_axes(angles: Floats2, old_order: Ints, order: Ints, rule: Rule) -> None:
     """Convert angles from sequence ``given`` to ``wanted``, in place: the first solution."""
     m = np.empty(9)
-    i, j, k = wanted[0], wanted[1], wanted[2]
+    i, j, k = order[0], order[1], order[2]
     e = 1.0 if (j - i + 3) % 3 == 1 else -1.0
     for row in angles:
         for n in range(9):
             m[n] = 1.0 if n % 4 == 0 else 0.0
         for p in range(3):
-            sine, cosine = sine_cosine(row[given[p]], rule)
-            _rotate(m, (given[p] + 1) % 3, (given[p] + 2) % 3, sine, cosine)
+            sine, cosine = sine_cosine(row[old_order[p]], rule)
+            _rotate(m, (old_order[p] + 1) % 3, (old_order[p] + 2) % 3, sine, cosine)
         first = angle_of(-e * m[3 * j + k], m[4 * k], rule)
         # What is left when the first is undone has no small numbers in it, also where cos b is 0.
         sine, cosine = sine_cosine(first, rule)

@@ -1,7 +1,7 @@
 """Joints that are coded as Euler angles in another order of axes than the source has.
 
-SPEC.md, "Axis orders", is normative. Where the middle angle of the source comes near a quarter
-turn, its other two turn fast although the joint does not; in another order all three may be calm.
+SPEC.md, "Axis orders", is normative. When the middle angle of the source comes near a quarter turn,
+its other two turn fast although the joint does not; in another order all three may be calm.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Orders:
         return coded
 
     def notes_and_values(self, source: Floats, coded: Floats) -> tuple[bytes, Floats]:
-        """Notes for a decoder beside ``to_coded_order`` values, and the values that it restores."""
+        """Notes for a decoder of ``to_coded_order`` values, and the values that it restores."""
         if not self.places:
             return b"", coded
         notes = np.zeros((len(coded), len(self.places), N_NOTES), np.int64)
@@ -116,7 +116,7 @@ class Orders:
         return _build_notes(notes), self.values(coded, notes)
 
     def read_notes(self, stream: bytes, n_frames: int, where: str) -> tuple[Ints, bytes]:
-        """The notes, (n_frames, n_places, 4), that a stream begins with, and the rest of it."""
+        """The notes, (n_frames, n_places, 4), at the start of a stream, and the rest of it."""
         notes = np.zeros((n_frames, len(self.places), N_NOTES), np.int64)
         return (notes, _read_notes(stream, notes, where)) if self.places else (notes, stream)
 
@@ -130,10 +130,10 @@ class Orders:
         return values
 
     def _reorder_axes(
-        self, values: Floats, place: ReorderedJoint, given: Ints, wanted: Ints
+        self, values: Floats, place: ReorderedJoint, old_order: Ints, order: Ints
     ) -> Floats:
         angles = np.ascontiguousarray(values[:, place.columns])
-        kernels().reorder_axes(angles, given, wanted, self.rule)
+        kernels().reorder_axes(angles, old_order, order, self.rule)
         return angles
 
 
@@ -144,7 +144,7 @@ def _reordered_joint(skeleton: Skeleton, index: int, code: int) -> ReorderedJoin
 
 
 def _build_notes(notes: Ints) -> bytes:
-    """Build the notes: their count, then the gap to the one before and the turns of each."""
+    """Build the notes: their count, then the distance to the one before and the turns of each."""
     flat = notes.ravel()
     numbers = np.flatnonzero(flat).tolist()
     out = bytearray(varint(len(numbers)))

@@ -3,12 +3,12 @@
 SPEC.md, "Codec 3: posewave", is normative; the names below are its field names.
 
 Frames become a pyramid: an approximation of every 32nd frame or so, and details of five levels. All
-channels of one time and level are a row. A row is not coded in degrees but in the metric of the
-pose that a decoder has from the coarser levels: how far points and local axes move. So one
-quantizer step serves all channels, and what is not seen costs nothing.
+channels of one time and level are a row. A row is coded not in degrees but in the metric of the
+pose that a decoder has from the coarser levels: the movement of points and local axes. So one
+quantizer step serves all channels, and invisible changes cost nothing.
 
 Exactness: lossy; decoding is bit-exact (integers, and binary64 + - * / in the order that SPEC.md
-states). A stream holds one resolution of one segment; a segment decodes by itself.
+states). A stream holds one resolution of one segment; segments decode independently.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from mcz.codecs.posewave.exact_channels import (
     most_frames,
     partition,
 )
-from mcz.codecs.posewave.header import NAME, Header, parse_header
+from mcz.codecs.posewave.header import NAME, Header, parse_posewave_header
 from mcz.codecs.posewave.model_state import MAX_EXPONENT
 from mcz.codecs.posewave.segment import SegmentChain, decode_segment, encode_segment
 from mcz.codecs.segments import (
@@ -61,15 +61,15 @@ from mcz.model.motion import Skeleton
 from mcz.model.types import Bools, Floats, Params, Settings, Values
 from mcz.model.units import UNIT_CM
 
-JOINING = 480  # frames from one that starts fresh to the next, where the caller leaves it open
+JOINING = 480  # frames from one that starts fresh to the next, by default
 NEEDS_ALL = ("quality", "lossless", "contacts")
 
 
 class LiveEncoder(contract.LiveEncoder):
     """Encode one frame per push, periodically a fresh segment, else a continuation.
 
-    With a preset each frame is coded with finer and finer steps until no point of it is farther off
-    than the preset promises. A frame that is refused leaves no trace.
+    With a preset each frame is coded with finer and finer steps until all its points are within the
+    promised error. A refused frame changes no state.
     """
 
     models: tuple[Model, ...] = ()
@@ -85,7 +85,7 @@ class LiveEncoder(contract.LiveEncoder):
         bound = PRESETS[options["preset"]] if options["step"] is None else None
         choice = live_choice(self.skeleton, options["step"], bound)
         self.header, self._weight = choice.header, choice.weights.approximations
-        fields = parse_header(self.header, layout)
+        fields = parse_posewave_header(self.header, layout)
         self.version = fields.version
         self._chain = SegmentChain(fields, self.skeleton)
         self._bound = math.inf if bound is None else bound / (self.skeleton.unit_cm or 1.0)
@@ -121,9 +121,12 @@ class LiveDecoder:
     """The inverse of ``LiveEncoder``."""
 
     def __init__(self, header: bytes, layout: Layout) -> None:
-        self._fields, self._skeleton = parse_header(header, layout), skeleton_of(NAME, layout)
+        self._fields, self._skeleton = (
+            parse_posewave_header(header, layout),
+            skeleton_of(NAME, layout),
+        )
         self._chain = SegmentChain(self._fields, self._skeleton)
-        self._broken = True  # until something fresh comes
+        self._broken = True  # until a fresh frame comes
 
     def push(self, stream: bytes, fresh: bool) -> Floats:
         if self._broken and not fresh:  # PWAVE-31
@@ -142,7 +145,7 @@ class LiveDecoder:
         self._broken = self._broken or n_frames > 0
 
 
-MOST_FRAMES = 8192  # of a segment, where the caller leaves it open
+MOST_FRAMES = 8192  # of a segment, by default
 LEAST_FRAMES = 512
 _LIMIT = re.compile(r"(?P<name>.+)=(?P<number>[0-9.e+-]+) ?(?P<unit>[a-z]+)")
 
@@ -159,7 +162,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     """
     layout = source.layout
     choice = choose(source, params)
-    header = parse_header(choice.header, layout)
+    header = parse_posewave_header(choice.header, layout)
     segments = _segments(source, header, choice, params)
     return Encoded(choice.header, segments, header.levels + 1, version=header.version)
 
@@ -173,11 +176,11 @@ def _segments(
         if layout.n_frames:
             yield Segment(0, layout.n_frames, ())
         return
-    wanted = segment_frames_of(layout, params["segment_frames"])
-    length = min(wanted or MOST_FRAMES, layout.most_frames)
+    requested = segment_frames_of(layout, params["segment_frames"])
+    length = min(requested or MOST_FRAMES, layout.most_frames)
     if header.exact_groups:
         length = min(length, most_frames(layout, header.exact_groups))
-    lengths = Lengths(length, bool(wanted), least=LEAST_FRAMES)
+    lengths = Lengths(length, bool(requested), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
     octaves, tracker, lossy = params["refinement"], choice.tracker, _lossy(header, layout)
 
@@ -215,7 +218,7 @@ def _lossy(header: Header, layout: Layout) -> list[int]:
 
 def exact_groups(header: bytes, layout: Layout) -> tuple[int, ...]:
     """The groups of ordinals; raises FormatError on bad bytes."""
-    return parse_header(header, layout).exact_groups
+    return parse_posewave_header(header, layout).exact_groups
 
 
 def decode(
@@ -230,7 +233,7 @@ def decode(
 
     Raises FormatError on bad bytes.
     """
-    fields = parse_header(header, layout)
+    fields = parse_posewave_header(header, layout)
     if fields.version > version:  # PWAVE-40
         raise FormatError(f"{NAME}: whole turns in a signal of version {version}")
     for span in spans:
@@ -262,7 +265,6 @@ def decode(
 
 
 def _needed_segments(spans: Sequence[Span], request: Request) -> range:
-    """The segments with which the requested frames can be decoded."""
     before = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
     stop = sum(span.first < request.stop for span in spans)
     return range(max(before, default=0), stop if request.start < request.stop else 0)
@@ -271,7 +273,7 @@ def _needed_segments(spans: Sequence[Span], request: Request) -> range:
 def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], Span], Floats]:
     """Return a function that decodes segments in order, (n_frames, n_channels) each.
 
-    Of exact channels it gives something that is of no account.
+    Its results for exact channels are undefined.
     """
     chain = SegmentChain(header, skeleton)
 
@@ -301,7 +303,9 @@ def joint_limits(text: object) -> tuple[tuple[str, float], ...]:
         try:
             limit = float(match["number"]) * UNIT_CM[match["unit"]]
         except ValueError:
-            raise OptionError(f"quality is {entry!r}: {match['number']!r} is no number") from None
+            raise OptionError(
+                f"quality is {entry!r}: {match['number']!r} is not a number"
+            ) from None
         if not 0 < limit < 1e9:
             raise OptionError(f"quality is {entry!r}: a limit must be more than 0")
         limits.append((match["name"], limit))

@@ -43,7 +43,7 @@ def _coding() -> ModuleType:
 
 
 class Stream:
-    """The bytes of a level, being written, or, of a decoder, read; ``coder`` goes from one on."""
+    """The bytes of a level, written or read; ``coder`` is passed from one to the next."""
 
     def __init__(self, coder: Ints, size: int, given: bytes | None) -> None:
         self.coder = coder
@@ -70,19 +70,19 @@ def fresh_coder(start: Start) -> Ints:
 
 
 def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: str) -> None:
-    """Code which channels are ``kept`` and the ``numbers`` of all, in place."""
+    """Code the mask ``kept`` of channels and the ``numbers`` of all, in place."""
     if _head().code_head(stream.coder, stream.data, N_SMALL, classes, kept, numbers):
         raise FormatError("a first value of more than 40 bits", where=where)
 
 
 class RowCoder:
-    """Codes the rows of one level after the other, all with one model, which learns.
+    """Codes the rows of one level after the other, all with one adaptive model.
 
     ``classes`` and ``kept`` are of all channels; ``where`` opens messages.
     """
 
     stream: Stream
-    exponents: Ints  # (n_rows,) of the level, or of what it goes on with
+    exponents: Ints  # (n_rows,) of the level, or of its continuation
 
     def __init__(self, header: Header, classes: Ints, kept: Bools, coder: Ints, where: str) -> None:
         known, channels = header.prior, np.flatnonzero(kept)
@@ -112,8 +112,8 @@ class RowCoder:
             seen[0] = CARRIED
 
     def go_on(self, n_rows: int, stream: Stream) -> None:
-        """More rows of the same level, in another stream."""
-        n_known = 2 - len(self._indices) % 2  # so that numbers of rows stay even, or odd
+        """Continue a level in another stream."""
+        n_known = 2 - len(self._indices) % 2  # keeps the parity of numbers of rows
         last, known = self._exponents[-1], self.here[-3 - n_known :]
         self.here = np.concatenate([known, new_rows(n_rows, self.n_kept)[3:]])
         self.stream = stream
@@ -121,24 +121,24 @@ class RowCoder:
         self._exponents[n_known - 1] = last
 
     def _make_room(self, n_known: int, n_rows: int) -> None:
-        """For rows that come, behind ``n_known`` ones that a stream before this one had."""
+        """Make room for new rows, after ``n_known`` ones of the stream before."""
         self._n_known = n_known
         self._indices = np.zeros((n_known + n_rows, self.n_kept), np.int64)
         self._wanted, self._means = np.zeros((2, *self._indices.shape))
         self._exponents = np.zeros(n_known + n_rows, np.int64)
         self.exponents = self._exponents[n_known:]
 
-    def encode(self, rate_weight: float, first: int, wanted: Floats) -> Floats:
+    def encode(self, rate_weight: float, first: int, rows: Floats) -> Floats:
         """Rows of coefficients, in steps, as a decoder will have them."""
         first += self._n_known
-        self._wanted[first : first + len(wanted)] = wanted
-        if not (np.abs(wanted) < MOST_WANTED).all():  # NaN too
+        self._wanted[first : first + len(rows)] = rows
+        if not (np.abs(rows) < MOST_WANTED).all():  # NaN too
             raise MotionError(f"{NAME}: a coefficient exceeds 2^29 quantizer steps")
-        self._run(first, first + len(wanted), rate_weight)
-        return self._decoded(first, first + len(wanted))
+        self._run(first, first + len(rows), rate_weight)
+        return self._decoded(first, first + len(rows))
 
     def decode(self, *, ends: bool = True) -> Floats:
-        """All rows of the level, (n_rows, n_kept), in steps; ``ends``: the stream does, too."""
+        """All rows of the level, (n_rows, n_kept), in steps; ``ends``: the stream must end too."""
         if not self.n_kept:
             if not self.stream.is_whole:  # PWAVE-20, PWAVE-30
                 raise FormatError("bytes of rows, but no channel is kept", where=self.where)

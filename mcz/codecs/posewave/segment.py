@@ -23,7 +23,7 @@ from mcz.errors import FormatError, MotionError
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, ROTATION_KINDS, Skeleton
 from mcz.model.types import Bools, Floats, Ints
 
-MOST_STILL = 4.0  # steps of constants: a channel that leaves its middle no farther is one
+MOST_STILL = 4.0  # steps: a channel that stays so near its middle is constant
 MAX_NUMBER = 2.0**40  # of a first value
 
 
@@ -50,7 +50,7 @@ class Head:
         return self.moving & ~header.exact  # PWAVE-38
 
     def values(self, header: Header) -> Floats:
-        """The pose that the numbers stand for, (n_channels,)."""
+        """The pose of the numbers, (n_channels,)."""
         steps = np.where(self.moving, header.first, header.constant)
         return np.multiply(self.numbers, steps, dtype=np.float64)
 
@@ -65,9 +65,9 @@ def encode_segment(
 ) -> tuple[tuple[bytes, ...], Floats]:
     """Encode a segment of unwrapped ``values``; return its streams and the decoded values.
 
-    Both are (n_frames, n_channels). ``refinement`` (n_frames,) asks for steps of 2^-r of the
-    usual ones where rows bear on these frames, ``contacts`` has what is to keep its place. Exact
-    channels are of no account in what is found. Raises MotionError for values that are too large.
+    Both are (n_frames, n_channels). ``refinement`` (n_frames,) requests steps of 2^-r of the usual
+    ones for rows that affect these frames, ``contacts`` are held. Results for exact channels are
+    undefined. Raises MotionError for values that are too large.
     """
     orders = Orders(header.orders, skeleton)
     coded = orders.to_coded_order(values)
@@ -130,9 +130,9 @@ def room_of(pyramid: Pyramid, level: int, kept: Bools) -> int:
 def decode_segment(
     header: Header, skeleton: Skeleton, streams: Sequence[bytes], n_frames: int, where: str
 ) -> Floats:
-    """The values, (n_frames, n_channels); details of which there is no stream are zero.
+    """The values, (n_frames, n_channels); details without a stream are zero.
 
-    Those of exact channels are of no account.
+    Results for exact channels are undefined.
     """
     pyramid = Pyramid(n_frames, header.levels, header.borrowing)
     n_empty = header.levels - pyramid.n_details
@@ -193,7 +193,7 @@ def classes_of(skeleton: Skeleton, whole: bool = False) -> Ints:
 
 
 def choose_kept(header: Header, values: Floats) -> Bools:
-    """All channels but exact ones and those that hardly leave their middle."""
+    """All channels except exact ones and those that hardly leave their middle."""
     moved: Bools = np.ptp(values, axis=0) > MOST_STILL * header.constant
     return moved & ~header.exact
 
@@ -201,7 +201,7 @@ def choose_kept(header: Header, values: Floats) -> Bools:
 def choose_head(header: Header, values: Floats, kept: Bools, approx: Floats) -> Head:
     """Kept channels begin near their first approximation, others stay in their middle.
 
-    Exact ones, which the pose alone needs, do so in coarse steps.
+    Exact ones, which only the pose needs, do so in coarse steps.
     """
     first = 0.5 * (values.min(axis=0) + values.max(axis=0))
     first[kept] = approx[0]
@@ -219,7 +219,7 @@ class SegmentChain:
         self.header, self.skeleton = header, skeleton
         self._classes = classes_of(skeleton, header.whole)
         self._kinds = kinds_of(skeleton, header.whole)
-        self._level_coder: LevelCoder | None = None  # None: nothing can go on
+        self._level_coder: LevelCoder | None = None  # None: no segment can continue
         self._rows: RowCoder | None = None
 
     def copy(self) -> SegmentChain:
@@ -266,8 +266,8 @@ class SegmentChain:
             rows.go_on(n_frames, Stream(rows.model.coder, room, None))
         rows.exponents[:] = exponent
 
-        def code(first: int, wanted: Floats) -> Floats:
-            return rows.encode(weight, first, wanted)
+        def code(first: int, coefficients: Floats) -> Floats:
+            return rows.encode(weight, first, coefficients)
 
         level_coder.code_coarsest(0, code, values[:, level_coder.kept], rows.exponents)
         self._level_coder, self._rows = level_coder, rows
@@ -275,7 +275,7 @@ class SegmentChain:
 
     def _continued_state(self, where: str) -> tuple[LevelCoder, RowCoder]:
         if self._level_coder is None or self._rows is None:  # DATA-11
-            raise FormatError("goes on from a segment that is not there", where=where)
+            raise FormatError("continues a segment that is missing", where=where)
         return self._level_coder, self._rows
 
     def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[LevelCoder, RowCoder]:

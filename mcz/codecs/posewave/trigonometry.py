@@ -1,9 +1,9 @@
 """Sine, cosine and arc tangent, the same bits on every machine.
 
-SPEC.md, "Pose metric" and "Axis orders", is normative. Sine and cosine: an angle less whole quarter
-turns, then two polynomials, by + - * in one order; exact to 1e-12 up to 2^20 quarter turns. Arc
-tangent: a quotient of at most tan(1/16 turn), its series, then whole eighths and quarters, by
-+ - * / in one order; exact to 1e-15 of a turn.
+SPEC.md, "Pose metric" and "Axis orders", is normative. Sine and cosine: an angle without whole
+quarter turns, then two polynomials, by + - * in one order; exact to 1e-12 up to 2^20 quarter turns.
+Arc tangent: a quotient of at most tan(1/16 turn), its series, then whole eighths and quarters, by +
+- * / in one order; exact to 1e-15 of a turn.
 """
 
 from __future__ import annotations
@@ -11,13 +11,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+BEYOND = 2.0**40  # values of this magnitude or more count as 0
 
-BEYOND = 2.0**40  # a value of this magnitude or more counts as 0
-
-STEEP = 0.41421356237309503  # above it an eighth of a turn is taken off
+STEEP = 0.41421356237309503  # above it an eighth of a turn is subtracted
 N_FACTORS = 20
 # Of the series x - x^3 / 3 + x^5 / 5 ..., the last factor first.
 LAST = 1.0 / (2 * N_FACTORS + 1.0)
@@ -39,7 +36,7 @@ class Rule(NamedTuple):
 RULES = {
     "deg": Rule(1.0 / 90.0, 90.0, 0.0, 0.017453292519943295),
     "rad": Rule(0.6366197723675814, 1.5707963267341256, 6.077100506506192e-11, 1.0),
-    "": Rule(0.0, 0.0, 0.0, 0.0),  # unknown: nothing turns
+    "": Rule(0.0, 0.0, 0.0, 0.0),  # unknown unit: no turns
 }
 
 # Of the Taylor series, the last factor first: 1 / (k (k + 1)).

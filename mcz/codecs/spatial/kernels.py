@@ -90,13 +90,13 @@ def _code_row(state: Ints, data: Bytes, row: Ints, length: int, above: Ints, sid
             scales = 8 * last + 4 * before + 2 * (a + b), 6 * (a + b) + 3 * around
             near = min(bits(length - k), 7)
             sides, first = (side_1, side_2, side_of(above[k])), OTHERS
-        found = code_residual(state, data, row[k], scales, near, sides, first)
-        if found == FAULT or abs(found) > MAX_INDEX:  # SPACE-12
+        fault = code_residual(state, data, row[k], scales, near, sides, first)
+        if fault == FAULT or abs(fault) > MAX_INDEX:  # SPACE-12
             return 1
-        row[k] = found
+        row[k] = fault
         if k > 0:  # WIND-11
-            before, last = last, abs(found)
-            side_2, side_1 = side_1, side_of(found)
+            before, last = last, abs(fault)
+            side_2, side_1 = side_1, side_of(fault)
     return 0
 
 

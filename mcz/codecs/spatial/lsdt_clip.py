@@ -1,12 +1,11 @@
 """Codec 20, preset ``lsdt-clip``: windows of frames, cosines in time, a learned basis in space.
 
-SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has what a decoder needs, this file
-what an encoder chooses.
-Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using
-learned spatial decorrelation transform, 2016, section 3.2.
+SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has the decoder, this file the
+encoder's choices. Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Low-latency compression
+of mocap data using learned spatial decorrelation transform, 2016, section 3.2.
 
 Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
-states). A window decodes by itself; its length is the delay.
+states). Windows decode independently; their length is the delay.
 """
 
 from __future__ import annotations

@@ -106,7 +106,7 @@ def _vectors(coder: _Coder, source: SignalSource, length: int) -> Iterator[Ints]
 
 
 def _segments(source: SignalSource, coder: _Coder, given: int) -> Iterator[Segment]:
-    """``given`` frames each, or, where that is 0, as many as make a DATA of the usual size."""
+    """Segments of ``given`` frames, or, if 0, of as many as make a DATA of the usual size."""
     layout = source.layout
     if not layout.n_channels:
         if layout.n_frames:
@@ -197,11 +197,11 @@ class _Coder:
         self._tracks = np.zeros((space.n_rows, _kernels().TRACK_SIZE), np.int64)
         self._begins = 1
 
-    def decode(self, stream: bytes, n_frames: int, wanted: int) -> Floats:
-        """The first ``wanted`` frames of a segment; raises FormatError on bad bytes."""
-        indices = np.zeros((wanted, self.space.n_rows), np.int64)
-        self._parse(stream, indices, whole=wanted == n_frames)  # FRAME-10
-        out = np.empty((wanted, len(self._values)))
+    def decode(self, stream: bytes, n_frames: int, n_decoded: int) -> Floats:
+        """The first ``n_decoded`` frames of a segment; raises FormatError on bad bytes."""
+        indices = np.zeros((n_decoded, self.space.n_rows), np.int64)
+        self._parse(stream, indices, whole=n_decoded == n_frames)  # FRAME-10
+        out = np.empty((n_decoded, len(self._values)))
         _kernels().add_frames(out, self._values, indices, self.space.transform())
         return out
 
@@ -262,7 +262,7 @@ class _Coder:
 
 
 class _LiveEncoder(LiveEncoder):
-    """One frame a push, each a segment that needs the one before, from time to time a fresh one."""
+    """One frame a push, each a segment that needs the one before, periodically a fresh one."""
 
     version: int | None = None
 
@@ -299,7 +299,7 @@ class _LiveDecoder:
 
     def __init__(self, header: bytes, layout: Layout) -> None:
         self._coder = _Coder(header, layout)
-        self._broken = True  # until something fresh comes
+        self._broken = True  # until a fresh frame comes
 
     def push(self, stream: bytes, fresh: bool) -> Floats:
         if fresh:

@@ -1,9 +1,8 @@
 """Codec 20, preset ``mdtt``: cosines in time, the clip's own basis in space, of low rank.
 
-SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has what a decoder needs, this file
-what an encoder chooses.
-Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Human motion capture data tailored
-transform coding, 2015, as their paper of 2016 describes it in section 5.4.1.
+SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has the decoder, this file the
+encoder's choices. Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Human motion capture
+data tailored transform coding, 2015, as their paper of 2016 describes it in section 5.4.1.
 
 Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
 states). The bases are in the file, as a model.

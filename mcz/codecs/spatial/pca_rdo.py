@@ -1,9 +1,8 @@
 """Codec 20, preset ``pca-rdo``: principal components of poses, and of their courses in windows.
 
-SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has what a decoder needs, this file
-what an encoder chooses.
-Source: L. Vasa, G. Brunnett, Rate-distortion optimized compression of motion capture data, 2014, as
-Hou 2016 describes it in sections 2.1 and 5.4.2.
+SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has the decoder, this file the
+encoder's choices. Source: L. Vasa, G. Brunnett, Rate-distortion optimized compression of motion
+capture data, 2014, as Hou 2016 describes it in sections 2.1 and 5.4.2.
 
 Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
 states). Mean, components and courses are in the file, as a model.

@@ -40,7 +40,7 @@ NO_CODES = CodeFields(coder=ADAPTIVE, gap_lengths=None, value_lengths=None)
 
 @dataclass(frozen=True, slots=True)
 class Codes:
-    """The two codes of a clip as the compiled loop has them."""
+    """The two codes of a clip for the compiled loop."""
 
     gaps: Ints
     values: Ints
@@ -68,14 +68,13 @@ def fields_of(blocks: Iterable[Ints]) -> CodeFields:
 
 
 def _classes(numbers: Ints) -> Ints:
-    """The class of each integer."""
     n = np.frexp(numbers.astype(np.float64))[1].astype(np.int64)  # of 0 to 2^41, exact
     wide = DIRECT + 2 * (n - 5) + (numbers >> np.maximum(n - 2, 0) & 1)
     return np.where(numbers < DIRECT, numbers, wide)
 
 
 def codes_from(fields: CodeFields, where: str) -> Codes | None:
-    """The codes in the fields of CODE, None where there are none; raises FormatError."""
+    """The codes in the fields of CODE, None if absent; raises FormatError."""
     if fields.coder == ADAPTIVE:
         return None
     return Codes(_table(fields.gap_lengths or (), where), _table(fields.value_lengths or (), where))
@@ -119,7 +118,7 @@ def parse_vectors(
 ) -> None:
     """Fill ``rows`` (n_rows, n), zero before, from ``data``; ``starts`` as in ``build_vectors``.
 
-    ``whole``: to its end, which its bits must need. Raises FormatError on bad bytes.
+    ``whole``: all bits of ``data`` must be needed. Raises FormatError on bad bytes.
     """
     stream, coder = np.frombuffer(data, np.uint8).copy(), np.array([0, 0])
     fault = _kernels().code_vectors(coder, stream, rows, starts, codes.gaps, codes.values)
@@ -128,6 +127,4 @@ def parse_vectors(
         raise FormatError(f"{where} has no code, or is out of range")
     # BITS-02, BITS-03
     if whole and (-(-used // 8) != len(data) or (used % 8 and data[-1] << used % 8 & 255)):
-        raise FormatError(
-            f"{len(data)} bytes for {used} bits, or bits behind the last", where=where
-        )
+        raise FormatError(f"{len(data)} bytes for {used} bits, or bits after the last", where=where)

@@ -1,7 +1,7 @@
 """Encoder fit of bases to a whole clip, and the number worth their bytes.
 
-Source: Hou 2016, sections 2 and 5.4; mcz/codecs/spatial/README.md describes it. Nothing here is the
-same to the last bit on every machine; what is decoded is.
+Source: Hou 2016, sections 2 and 5.4; mcz/codecs/spatial/README.md describes it. Results may differ
+in the last bits between machines; decoded values do not.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from mcz.model.types import Floats, Ints, Params
 
 LARGEST = 2.0**60  # steps: a window with such a value has a coefficient beyond 2^40 steps
 BIT = math.log(2) / 4  # squared steps that a bit is worth: of fine steps log(2) / 6 would be
-THRESHOLD = 0.7  # of a step: what is smaller becomes 0
+THRESHOLD = 0.7  # of a step: smaller coefficients become 0
 PER_ONE, PER_OCTAVE = 2.0, 1.5  # about the bits of a coefficient that is not zero
-ENTRY, ENTRY_OCTAVE = 0.5, 1.2  # about those of an entry of a basis
+ENTRY, ENTRY_OCTAVE = 0.5, 1.2  # estimated bits of an entry of a basis
 LESS_DIGITS = 1.0  # of a vector's entries than log2 of all its coefficients' size in steps
-MEAN_STEPS = 8  # a mean is right to so many parts of a step
+MEAN_STEPS = 8  # parts of a step to which a mean is exact
 LONGEST = 1024  # frames: courses of longer windows are too many
-ROOM = MAX_ENTRIES - 2**15  # for vectors and courses, beside a mean
+ROOM = MAX_ENTRIES - 2**15  # for vectors and courses, in addition to a mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +60,8 @@ class Fit:
     ``columns`` (n_matrices, n_points) are the channels of each matrix, ``vectors`` of each an
     orthonormal basis (n_points, n_points), the vector with the greatest ``energies`` (n_points,),
     sums over all frames, first. ``courses`` (window, window) are such vectors in time, as
-    coefficients of cosines; None without. ``mean`` (n_channels,), in units of the weights, is what
-    was taken away, ``stored`` the same as a basis.
+    coefficients of cosines; None without. ``mean`` (n_channels,), in units of the weights, was
+    subtracted; ``stored`` is the same as a basis.
     """
 
     columns: Ints
@@ -87,7 +87,7 @@ class WindowOptions:
 
 
 def window_options(params: Params, chosen: Params, step: float) -> WindowOptions:
-    """Convert parameters to options; ``chosen`` has those that a preset sets."""
+    """Convert parameters to options; ``chosen`` are settings of a preset."""
     return WindowOptions(
         step,
         chosen["window"],
@@ -134,10 +134,10 @@ def plan_of(
     mean: bool,
     courses: bool,
 ) -> Plan:
-    """The plan of an encoder: bases of the clip itself, no more of them than pay.
+    """The plan of an encoder: as many bases of the clip itself as are worthwhile.
 
-    ``apart``: x, y and z have each their own; ``mean``: it is taken away first; ``courses``: there
-    is a basis in time, too, where windows are not too long for it. Raises MotionError for what
+    ``apart``: x, y and z have bases of their own; ``mean``: it is subtracted first; ``courses``:
+    there is a basis in time too, unless windows are too long. Raises MotionError for values that
     cannot be coded.
     """
     windows = Windows(name, source, sample, asked)
@@ -194,12 +194,13 @@ def fit(windows: Windows, *, apart: bool, mean: bool, courses: bool) -> Fit:
 
 
 def _mean(windows: Windows) -> tuple[Floats, Basis]:
-    """The mean of all frames, and how it is stored; where that is far off, it stands for the mean.
+    """The mean of all frames, and its stored form; if that is far off, it replaces the mean.
 
-    It is rounded to parts of a step, or as fine as it can be.
+    It is rounded to parts of a step, or as fine as possible.
     """
     total = first = None
-    for values in windows:  # from the first frame, for what stands still to have no rounding
+    # relative to the first frame, so that constant channels have no rounding
+    for values in windows:
         first = values[0] if first is None else first
         part = (values - first).sum(axis=0)
         total = part if total is None else total + part
@@ -231,7 +232,6 @@ def _principal(products: bytes, n: int) -> tuple[Floats, Floats]:
 def _bases(
     windows: Windows, clip_fit: Fit, asked: WindowOptions
 ) -> tuple[list[Basis | Floats], int]:
-    """The bases of the model, and the coefficients of a row in time."""
     room = ROOM if clip_fit.courses is None else ROOM // 2
     most = min(clip_fit.columns.shape[1], room // clip_fit.columns.size)
     spatial = [
@@ -313,7 +313,7 @@ def _counts(
 
 
 def _cost(basis: Basis) -> Floats:
-    """Squared steps that the bits of the first vectors are worth, (n_vectors,)."""
+    """The bits of the first vectors in squared steps, (n_vectors,)."""
     bits = (ENTRY + ENTRY_OCTAVE * np.log2(1.0 + np.abs(basis.entries))).sum(axis=1)
     result: Floats = BIT * (bits + 8).cumsum()
     return result

@@ -42,7 +42,7 @@ from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import FormatError, MotionError
 from mcz.model.schema import (
     UVARINT,
-    CheckedBeside,
+    CheckedInRecord,
     Record,
     bounded,
     build,
@@ -63,7 +63,7 @@ class WindowsHeader(Record):
 
     window: int = field(bounded(UVARINT, 1, MAX_WINDOW), "frames, 1 to 2048")
     n_frequencies: int = field(
-        CheckedBeside(UVARINT, lambda n, fields: 1 <= n <= fields.window),
+        CheckedInRecord(UVARINT, lambda n, fields: 1 <= n <= fields.window),
         "coefficients of a row, 1 to window",
     )  # WIND-06
     space: SpaceFields = field(SpaceFields, "how a frame becomes coefficients")
@@ -91,7 +91,7 @@ class Plan:
 def temporal_of(space: Space, fields: WindowsHeader, n_frames: int) -> Floats:
     """Matrix from a row of coefficients to values over a window, (n_frequencies, n_frames).
 
-    A window that is shorter than the others, the last one, has cosines of its own length.
+    A shorter last window has cosines of its own length.
     """
     if space.courses is not None and n_frames == fields.window:  # WIND-14
         return space.courses
@@ -104,7 +104,7 @@ def encode(name: str, source: SignalSource, plan: Plan) -> Encoded:
         window=plan.window, n_frequencies=plan.n_frequencies, space=plan.space, code=NO_CODES
     )
     quantizer = _Quantizer(name, source, plan, build(fields, f"{name} header"))
-    if plan.prefix and source.layout.n_channels:  # the codes are those of all windows
+    if plan.prefix and source.layout.n_channels:  # the codes are common to all windows
         fields.code = fields_of(quantizer.windows())
     header = build(fields, f"{name} header")
     codes = codes_from(parse(WindowsHeader, header, name).code, name)
@@ -113,8 +113,6 @@ def encode(name: str, source: SignalSource, plan: Plan) -> Encoded:
 
 
 class _Quantizer:
-    """The quantized coefficients of the windows of a signal."""
-
     def __init__(self, name: str, source: SignalSource, plan: Plan, header: bytes) -> None:
         layout = source.layout
         layout = replace(layout, find_model=model_finder((*plan.models, *plan.known)))
@@ -134,7 +132,7 @@ class _Quantizer:
             yield self._indices(reader.next(min(start + self.fields.window, n_frames)))
 
     def _indices(self, values: Floats) -> Ints:
-        """Raises MotionError where a coefficient is too large."""
+        """Quantize; raises MotionError for too large a coefficient."""
         space = self.space
         with np.errstate(all="ignore"):
             scaled = (values - space.mean) / space.weights / space.step
@@ -233,7 +231,6 @@ def _segment(
     request: Request,
     out: Floats,
 ) -> None:
-    """Write the windows of a segment that the request meets."""
     from mcz.codecs.spatial.kernels import synthesize
 
     n_windows = -(-span.n_frames // fields.window)
@@ -278,7 +275,7 @@ MAX_INDEX = 2**40
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Coefficients of a window, (n_rows, n_frequencies), and up to where each row has any."""
+    """Coefficients of a window, (n_rows, n_frequencies), and the used length of each row."""
 
     rows: Ints
     lengths: Ints
@@ -293,12 +290,11 @@ def _kernels() -> ModuleType:
 
 def build_window(rows: Ints, starts: Ints, codes: Codes | None) -> bytes:
     """The bytes of a window's coefficients, (n_rows, n_frequencies), none beyond MAX_INDEX."""
-    coded = _adaptive(rows, starts) if codes is None else build_vectors(rows, _one(rows), codes)
+    coded = _adaptive(rows, starts) if codes is None else build_vectors(rows, _starts(rows), codes)
     return varint(len(coded)) + coded
 
 
-def _one(rows: Ints) -> Ints:
-    """Every row is one vector."""
+def _starts(rows: Ints) -> Ints:
     return np.array([0, rows.shape[1]])
 
 
@@ -320,7 +316,7 @@ def parse_window(
     lengths = np.zeros(len(rows), np.int64)
     if codes is not None:
         # WIND-09
-        parse_vectors(data, rows, _one(rows), codes, f"{where}: a coefficient", whole=True)
+        parse_vectors(data, rows, _starts(rows), codes, f"{where}: a coefficient", whole=True)
         lengths = n_frequencies - np.argmax(rows[:, ::-1] != 0, axis=1)
         lengths[~rows.any(axis=1)] = 0
     else:

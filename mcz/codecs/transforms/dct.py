@@ -1,7 +1,7 @@
-"""The orthonormal discrete cosine transform, its matrix made by + - * / alone.
+"""The orthonormal discrete cosine transform, its matrix by + - * / only.
 
-SPEC.md, "Cosines", is normative and has the steps below in the same order: every machine makes the
-same numbers. They are within 1e-15 of the true ones.
+SPEC.md, "Cosines", is normative and has the steps below in the same order: every machine computes
+the same numbers, within 1e-15 of the true ones.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The 9/7 wavelet transform in time by lifting: halves, and halves of halves.
 
-SPEC.md, "Lifting", is normative: a signal ends where it ends, mirrored about its first and its last
-sample.
+SPEC.md, "Lifting", is normative: a signal is mirrored about its first and its last sample.
 """
 
 from __future__ import annotations

@@ -30,14 +30,14 @@ Progress = Callable[[int, int], None]  # iterations done, iterations at most
 SPARSITY = 8  # coefficients kept of each frame of 31 points; the paper's best, Fig. 4
 ITERATIONS = 300
 GROWTH = 40  # iterations with each smaller sparsity, before these
-SETTLED = 1e-9  # smallest relative gain, over PATIENCE iterations, that is worth going on for
+SETTLED = 1e-9  # least relative gain, over PATIENCE iterations, that justifies going on
 PATIENCE = 10
 HAAR_LEVELS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Learned:
-    """A basis, and how it was found.
+    """A basis, and the history of its search.
 
     ``basis`` float64 (J, J), orthogonal, its rows by falling energy of their coefficients over the
     training frames, the entry of greatest magnitude of each positive. ``objective`` (K + 1,): the
@@ -47,7 +47,8 @@ class Learned:
 
     basis: Floats
     objective: Floats
-    n_growth: int  # of the first iterations, while P grew: only from there on nothing ever rises
+    # of the first iterations, while P grew: only later ones never increase the objective
+    n_growth: int
 
     @property
     def n_iterations(self) -> int:
@@ -133,8 +134,8 @@ def learn_bases(
 def procrustes(products: Floats) -> Floats:
     """The orthogonal B (J, J) for which the sum of |B m - e|^2 is the least.
 
-    ``products`` (J, J) is the sum of e m^T over the frames. With its decomposition V S U^T, which
-    is that of equation 10 transposed, B is V U^T (equation 11).
+    ``products`` (J, J) is the sum of e m^T over the frames. With its decomposition V S U^T, the
+    transpose of equation 10, B is V U^T (equation 11).
     """
     left, _, right = np.linalg.svd(products)
     return np.ascontiguousarray(left @ right)
@@ -201,7 +202,7 @@ def _check_options(sparsity: int, iterations: int, growth: int, n_points: int) -
 
 
 def _checked_frames(frames: Floats) -> Floats:
-    """``frames`` as float64 (N, J) in row order; raises OptionError where they cannot be used."""
+    """``frames`` as float64 (N, J) in row order; raises OptionError for unusable ones."""
     if frames.ndim != 2 or not frames.size:
         raise OptionError(f"frames have shape {frames.shape}; at least one of one point is needed")
     rows = np.ascontiguousarray(frames, np.float64)

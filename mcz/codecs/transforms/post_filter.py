@@ -22,26 +22,26 @@ CUTOFFS = (1.0, 3.0, 5.0)  # Hz
 THRESHOLDS_CM = (2.0, 12.0)  # of the error of prediction; up to the first, the lowest cutoff serves
 SCALE = 2**30  # taps are multiples of 1 / SCALE
 PI, TWO_PI = 3.141592653589793, 6.283185307179586
-N_PAST = 3  # filtered rows that a prediction looks back on
+N_PAST = 3  # filtered rows of a prediction
 RING = 1024  # rows that a stream holds before it moves them
 
 
 class PostFilter:
-    """The filter of rows that come one by one: each goes out when the 12th after it has come in.
+    """The filter of rows that come one by one: each is returned when the 12th after it has arrived.
 
-    ``rate`` is rows a second, ``unit_cm`` the length unit of the numbers in cm. What comes out is
-    bit for bit what ``filter_rows`` makes of all rows at once.
+    ``rate`` is rows a second, ``unit_cm`` the length unit of the numbers in cm. The output equals
+    ``filter_rows`` of all rows bit for bit.
     """
 
     def __init__(self, n_channels: int, rate: float, unit_cm: float) -> None:
         self._settings = _settings(rate, unit_cm)
         self._rows = np.full((RING + 2 * DELAY, n_channels), np.nan)
         self._past = np.zeros((N_PAST, n_channels))
-        self._next = DELAY  # where the next row goes
+        self._next = DELAY  # place of the next row
         self._n_held = 0  # rows that have not gone out
 
     def push(self, row: Floats) -> Floats | None:
-        """Take a row, (n_channels,), NaN where nothing is known; the row of 12 before, filtered.
+        """Take a row, (n_channels,), NaN where unknown; return the row of 12 before, filtered.
 
         None as long as there is none. Raises MotionError for a row of another size.
         """
@@ -61,7 +61,7 @@ class PostFilter:
         return result
 
     def finish(self) -> Floats:
-        """The rest, at most 12 rows, (n, n_channels); afterwards the filter is as new."""
+        """The rest, at most 12 rows, (n, n_channels); afterwards the filter is reset."""
         rest = self._rows[self._next - self._n_held - DELAY : self._next]
         rows = _filter_middle(np.concatenate((rest, self._unknown())), self._past, *self._settings)
         self._rows[:DELAY] = self._unknown()
@@ -75,9 +75,9 @@ class PostFilter:
 def filter_rows(rows: Floats, rate: float, unit_cm: float) -> Floats:
     """``rows``, float64 (n_rows, n_channels), filtered; ``rate`` in rows a second.
 
-    A channel is a coordinate of a point, in units of ``unit_cm`` cm, NaN where it is not known:
-    each run of known rows is filtered by itself. Raises OptionError as ``filter_taps`` does, and
-    for a unit that is not positive.
+    A channel is a coordinate of a point, in units of ``unit_cm`` cm, NaN where unknown: each run of
+    known rows is filtered separately. Raises OptionError as ``filter_taps``, and for a unit that is
+    not positive.
     """
     n_channels = rows.shape[1]
     unknown = np.full((DELAY, n_channels), np.nan)
@@ -86,7 +86,7 @@ def filter_rows(rows: Floats, rate: float, unit_cm: float) -> Floats:
 
 
 def _filter_middle(rows: Floats, past: Floats, bank: Floats, low: float, high: float) -> Floats:
-    """All but the first and the last 12 of ``rows``, filtered; ``past`` is carried on."""
+    """All but the first and the last 12 of ``rows``, filtered; ``past`` is updated."""
     from mcz.codecs.transforms.post_filter_kernels import filter_middle
 
     out = np.empty((len(rows) - 2 * DELAY, rows.shape[1]))

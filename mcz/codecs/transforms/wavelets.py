@@ -211,9 +211,9 @@ IDS = {name: id_ for id_, name in enumerate(WAVELETS, 1)}
 
 @cache
 def by_name(name: str) -> tuple[int, Wavelet]:
-    """The id and filters of a wavelet; another one that PyWavelets knows has the id INLINE.
+    """The id and filters of a wavelet; others of PyWavelets have the id INLINE.
 
-    Raises OptionError for a name that neither knows.
+    Raises OptionError for an unknown name.
     """
     if name in WAVELETS:
         return IDS[name], WAVELETS[name]

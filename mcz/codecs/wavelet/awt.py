@@ -1,15 +1,14 @@
-"""Codec 16, preset ``awt``: wavelets in time, coefficients shared out among the channels.
+"""Codec 16, preset ``awt``: wavelets in time, coefficients allocated to the channels.
 
-SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has what a decoder needs, this file
-what an encoder chooses.
-Source: P. Beaudoin, P. Poulin, M. van de Panne, Adapting wavelet compression to human motion
-capture clips, 2007, as M. A. Khan, An efficient algorithm for compression of motion capture signal
-using multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5, describes it;
-the preset ``khan2014`` is the method of the latter, the defaults improve upon it.
+SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has the decoder, this file the encoder's
+choices. Source: P. Beaudoin, P. Poulin, M. van de Panne, Adapting wavelet compression to human
+motion capture clips, 2007, as M. A. Khan, An efficient algorithm for compression of motion capture
+signal using multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5,
+describes it; the preset ``khan2014`` is the method of the latter, the defaults improve upon it.
 
-Exactness: lossy; decoding is bit-exact (integers, then binary64 products and sums in the order
-that SPEC.md states). A stream holds one channel at one
-resolution of one segment. An encoder needs the whole clip in memory.
+Exactness: lossy; decoding is bit-exact (integers, then binary64 products and sums in the order that
+SPEC.md states). A stream holds one channel at one resolution of one segment. An encoder needs the
+whole clip in memory.
 """
 
 from __future__ import annotations
@@ -49,11 +48,11 @@ from mcz.codecs.wavelet.wavelet import (
 from mcz.errors import MotionError
 from mcz.model.types import Bools, Floats, Ints, Params, Settings
 
-FRAMES_A_COEFFICIENT = 8  # where a_w is not given
+FRAMES_A_COEFFICIENT = 8  # by default
 DISTORTIONS = ("positions", "channels")
 PRESETS: dict[str, Settings] = {
-    # As published: any coefficient may be dropped, the whole clip at once, and the levels that
-    # were asked for however short it is.
+    # As published: any coefficient may be dropped, the whole clip at once, and the requested levels
+    # for any length.
     "khan2014": {"a_w": 40.0, "Q": 2, "N": 4, "wavelet": "db2", "distortion": "channels"},
     "default": {"a_w": None, "Q": None, "N": 4, "wavelet": "bior4.4", "distortion": "positions"},
 }
@@ -85,7 +84,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
 
 
 def _weights(source: SignalSource, distortion: str) -> Floats:
-    """The threshold of each channel that goes with one of 1, (n_channels,)."""
+    """The threshold of each channel relative to 1, (n_channels,)."""
     layout = source.layout
     skeleton = skeleton_of("awt", layout)
     if distortion == "channels":
@@ -95,7 +94,7 @@ def _weights(source: SignalSource, distortion: str) -> Floats:
 
 
 def _weigh(source: SignalSource, options: Params) -> tuple[Floats, None]:
-    """Weights of a clip that was coded with these options; its thresholds are not known."""
+    """Weights of a clip that was encoded with these options; its thresholds are unknown."""
     return _weights(source, preset_values(PRESETS, options)["distortion"]), None
 
 
@@ -139,7 +138,7 @@ Masks = list[Bools]
 LARGEST = 2.0**90
 BLOCK_FRAMES = 4096  # analyzed at a time
 MOVES = 4000  # of the annealing, for each channel
-FINEST = 2.0**-24  # of the greatest coefficient of a channel: no step is finer
+FINEST = 2.0**-24  # of the greatest coefficient of a channel: the least step
 FEWEST_MOVES, MOST_MOVES = 100_000, 20_000_000
 
 
@@ -147,11 +146,10 @@ FEWEST_MOVES, MOST_MOVES = 100_000, 20_000_000
 class Choice:
     """The allocation that annealing has found.
 
-    ``kept`` are masks band by band, the coarsest first. Of each channel: ``counts``, how many were
-    chosen; ``smallest``, the least magnitude of one that was, and ``smallest_detail``, infinite
-    where there is none; ``dropped``, the greatest of those that were not, 0 where all were;
-    ``greatest`` of all. The distortion ``before`` and ``after`` annealing is relative to the
-    greatest coefficient.
+    ``kept`` are masks band by band, the coarsest first. Of each channel: ``counts`` of chosen
+    coefficients; ``smallest``, the least magnitude of one, and ``smallest_detail``, infinite
+    without any; ``dropped``, the greatest of the others, 0 if there are none; ``greatest`` of all.
+    The distortion ``before`` and ``after`` annealing is relative to the greatest coefficient.
     """
 
     kept: Masks
@@ -191,9 +189,9 @@ def choose(
     """Keep ``average`` coefficients a channel, those that lower the distortion most.
 
     An error counts in units of its channel's ``weights`` (n_channels,). With
-    ``whole_approximation`` approximations that were not chosen are kept, too: they cost little, and
-    are as good as zero where steps are as large as they. Raises MotionError where a coefficient is
-    too large.
+    ``whole_approximation`` approximations that were not chosen are kept too: they cost little, and
+    are as good as zero if steps are as large as they. Raises MotionError for too large a
+    coefficient.
     """
     from mcz.codecs.wavelet import kernels
 
@@ -235,7 +233,7 @@ def choose(
 def quantizer_of(choice: Choice, weights: Floats, decimals: int | None) -> Quantizer:
     """Quantizer that separates kept from dropped coefficients.
 
-    Without ``decimals`` thresholds are as nearly proportional to ``weights`` as they can be.
+    Without ``decimals`` thresholds are as nearly proportional to ``weights`` as possible.
     """
     if decimals is not None:
         some = np.isfinite(choice.smallest_detail)
@@ -256,17 +254,17 @@ def quantizer_of(choice: Choice, weights: Floats, decimals: int | None) -> Quant
 def equal_counts(most: Ints, average: float) -> Ints:
     """Counts per channel, each at most ``most``, as equal as possible.
 
-    Their sum is ``average`` a channel, or all there are.
+    Their sum is ``average`` a channel, or the number of all.
     """
-    wanted = round(min(average * len(most), 2.0**52))
+    total = round(min(average * len(most), 2.0**52))
     low, high = 0, int(most.max(initial=0))
-    while low < high:  # the greatest common count that is within what is wanted
+    while low < high:  # the greatest common count within the total
         middle = (low + high + 1) // 2
-        if int(np.minimum(middle, most).sum()) <= wanted:
+        if int(np.minimum(middle, most).sum()) <= total:
             low = middle
         else:
             high = middle - 1
     counts = np.minimum(low, most)
     more = np.flatnonzero(counts < most)
-    counts[more[: max(0, wanted - int(counts.sum()))]] += 1
+    counts[more[: max(0, total - int(counts.sum()))]] += 1
     return np.asarray(counts, np.int64)

@@ -1,14 +1,12 @@
 """Codec 16, preset ``dwt``: a wavelet transform in time, one threshold for all channels.
 
-SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has what a decoder needs, this file
-what an encoder chooses.
-Source: M. A. Khan, An efficient algorithm for compression of motion capture signal using
+SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has the decoder, this file the encoder's
+choices. Source: M. A. Khan, An efficient algorithm for compression of motion capture signal using
 multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5; the preset
 ``khan2014`` follows the published implementation, the defaults improve upon it.
 
-Exactness: lossy; decoding is bit-exact (integers, then binary64 products and sums in the order
-that SPEC.md states). A stream holds one channel at one
-resolution of one segment.
+Exactness: lossy; decoding is bit-exact (integers, then binary64 products and sums in the order that
+SPEC.md states). A stream holds one channel at one resolution of one segment.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ from mcz.model.types import Floats, Params, Settings
 
 PRESETS: dict[str, Settings] = {
     # As published: t_w in the units of the source for positions too, the whole clip at once, and
-    # the levels that were asked for however short it is.
+    # the requested levels for any length.
     "khan2014": {"t_w": 3.0, "Q": 2, "N": 4, "wavelet": "db2"},
     "default": {"t_w": 0.2, "Q": None, "N": 4, "wavelet": "bior4.4"},
 }

@@ -82,7 +82,7 @@ def code_details(
         scales = 11 * last + 5 * before, 8 * activity + 4 * beside
         given = values[at]
         size = max(0, abs(given) - least + 1)
-        found = code_residual(
+        fault = code_residual(
             state,
             data,
             -size if given < 0 else size,
@@ -91,12 +91,12 @@ def code_details(
             (side_1, side_2, other),
             OWN,
         )
-        if found == FAULT or abs(found) > MAX_INDEX - least:  # MRDWT-29
+        if fault == FAULT or abs(fault) > MAX_INDEX - least:  # MRDWT-29
             return at
-        run = run + 1 if found == 0 else 0  # MRDWT-28
-        before, last = last, abs(found)
-        side_2, side_1 = side_1, side_of(found)
-        values[at] = 0 if found == 0 else found + least - 1 if found > 0 else found - least + 1
+        run = run + 1 if fault == 0 else 0  # MRDWT-28
+        before, last = last, abs(fault)
+        side_2, side_1 = side_1, side_of(fault)
+        values[at] = 0 if fault == 0 else fault + least - 1 if fault > 0 else fault - least + 1
     return -1
 
 

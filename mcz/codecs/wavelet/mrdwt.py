@@ -1,13 +1,12 @@
 """Codec 16, preset ``mrdwt``: a multiresolution wavelet transform in time, thresholds by joint.
 
-SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has what a decoder needs, this file
-what an encoder chooses.
-Source: M. A. Khan, Multiresolution coding of motion capture data for real-time multimedia
+SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has the decoder, this file the encoder's
+choices. Source: M. A. Khan, Multiresolution coding of motion capture data for real-time multimedia
 applications, 2016; the preset ``khan2016`` follows the published implementation exactly, the
 defaults improve upon it.
 
-Exactness: lossy; decoding is bit-exact (integers, then binary64 products and sums in the order
-that SPEC.md states). A stream holds one channel at one resolution of one segment.
+Exactness: lossy; decoding is bit-exact (integers, then binary64 products and sums in the order that
+SPEC.md states). A stream holds one channel at one resolution of one segment.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from mcz.model.types import Floats, Params, Settings
 
 PRESETS: dict[str, Settings] = {
     # Exactly as published: T_g in the units of the source for positions too, the whole clip at
-    # once, and the levels that were asked for however short it is.
+    # once, and the requested levels for any length.
     "khan2016": {"T_g": 12.0, "Q": 1, "N": 4, "wavelet": "db3", "threshold_rule": "depth"},
     "default": {
         "T_g": 0.2,

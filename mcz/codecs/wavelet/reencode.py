@@ -38,9 +38,9 @@ Weigh = Callable[[SignalSource, Params], tuple[Floats, float | None]]
 
 
 def recoder(weigh: Weigh) -> Recode:
-    """The ``recode`` of a preset; where steps follow the thresholds each channel keeps its.
+    """The ``recode`` of a preset; if steps follow the thresholds each channel keeps its own.
 
-    Elsewhere its encoder's ``weigh`` says what is small.
+    Otherwise the ``weigh`` of its encoder decides which coefficients are small.
     """
 
     def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
@@ -86,7 +86,7 @@ def _quantizer(
 
 
 def _step_code(group: int, asked: RecodeRequest, default: int) -> int:
-    """The step code that a channel has had, ``default`` where it was 0 all along."""
+    """The step code of a channel, ``default`` if it was always 0."""
     for segment in range(len(asked.spans)):
         stream = asked.fetch(segment, 0, group)
         if len(stream) > 1:

@@ -29,8 +29,8 @@ CONSTANT = 63  # in place of a scale: every coefficient is the first one
 class Coding:
     """Settings shared by the streams of a signal.
 
-    The codec's name, for messages; are there step codes; the least magnitude of a detail that is
-    not zero; where a coefficient lies in the next coarser band.
+    The codec's name, for messages; presence of step codes; the least magnitude of a detail other
+    than zero; the place of a coefficient in the next coarser band.
     """
 
     name: str
@@ -60,13 +60,13 @@ def build_streams(bands: Sequence[Ints], step: int, coding: Coding) -> list[byte
 
 
 def parse_streams(
-    stream: Callable[[int], bytes], counts: Sequence[int], wanted: Sequence[int], coding: Coding
+    stream: Callable[[int], bytes], counts: Sequence[int], limits: Sequence[int], coding: Coding
 ) -> tuple[list[Ints], int]:
-    """The first ``wanted`` of ``counts`` coefficients of every band, and the step code.
+    """The first ``decoded_counts`` of ``counts`` coefficients of every band, and the step code.
 
     Raises FormatError on bad bytes.
     """
-    prefixes = _prefixes(counts, wanted, coding)
+    prefixes = _prefixes(counts, limits, coding)
     band, step, known = _parse_approximations(stream(0), counts[0], prefixes[0], coding)
     bands, coarser = [band], _activity(band, counts[0])
     for number in range(1, len(counts)):
@@ -78,12 +78,12 @@ def parse_streams(
         )
         bands.append(band)  # MRDWT-20
         coarser = _magnitudes(band, coding)
-    return [band[:n] for band, n in zip(bands, wanted, strict=True)], step
+    return [band[:n] for band, n in zip(bands, limits, strict=True)], step
 
 
-def _prefixes(counts: Sequence[int], wanted: Sequence[int], coding: Coding) -> list[int]:
+def _prefixes(counts: Sequence[int], limits: Sequence[int], coding: Coding) -> list[int]:
     """Coefficients to decode per band: each band is the context of the next."""
-    prefixes = list(wanted)
+    prefixes = list(limits)
     for number in range(len(counts) - 1, 0, -1):
         context = (prefixes[number] + coding.shift) // 2 + 3
         prefixes[number - 1] = max(prefixes[number - 1], context)
@@ -202,18 +202,18 @@ def _zigzag(value: int) -> int:
     return 2 * value if value >= 0 else -2 * value - 1
 
 
-DEAD_ZONE = 0.8  # of a step: what is smaller becomes 0, where the step follows the threshold
+DEAD_ZONE = 0.8  # of a step: smaller coefficients become 0, if the step follows the threshold
 LEAST_UNIT = 2.0**-100
 GREATEST_LEAST = 2**39
-TOO_LARGE = 2.0**41  # in place of what is beyond all integers: the coder refuses it, by name
+TOO_LARGE = 2.0**41  # in place of numbers beyond all integers: the coder refuses it, by name
 
 
 @dataclass(frozen=True, slots=True)
 class Quantizer:
-    """Thresholds (n_channels,) and how a coefficient becomes an integer.
+    """Thresholds (n_channels,) and the quantization of a coefficient.
 
     With ``decimals`` it is rounded to so many, halves away from zero; otherwise steps follow the
-    thresholds, as ``unit`` times what each channel's ``codes`` stand for.
+    thresholds, as ``unit`` times the values of each channel's ``codes``.
     """
 
     thresholds: Floats
@@ -223,7 +223,7 @@ class Quantizer:
 
     @property
     def least(self) -> int:
-        """No detail that is not zero has a smaller magnitude."""
+        """The least magnitude of details other than zero."""
         if self.decimals is None or not len(self.thresholds):
             return 1
         least = math.floor(float(self.thresholds.min()) * 10.0**self.decimals + 0.5)
@@ -242,7 +242,7 @@ class Quantizer:
         indices = np.floor(scaled + 0.5)
         if detail:
             indices[small] = 0
-        # NaN, too, where sums have overflowed
+        # NaN too, if sums have overflowed
         capped = np.where(indices <= TOO_LARGE, indices, TOO_LARGE)
         return np.where(coefficients < 0, -capped, capped).astype(np.int64)
 
@@ -255,7 +255,5 @@ def make_quantizer(
     unit = T_g / DEAD_ZONE if T_g > 0 else 1.0
     codes = tuple(code_of(float(weight)) for weight in weights)
     if decimals is None and (not T_g > 0 or unit < LEAST_UNIT):
-        raise OptionError(
-            f"{name} is {T_g:g} and Q is not given, so that there is no quantizer step"
-        )
+        raise OptionError(f"{name} is {T_g:g} and Q is not given, which leaves no quantizer step")
     return Quantizer(thresholds, decimals, unit, codes)

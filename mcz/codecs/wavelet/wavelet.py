@@ -1,6 +1,6 @@
 """Codec 16, ``wavelet``: header, segments, and the decoder of all its presets.
 
-SPEC.md, "Codec 16: wavelet", is normative; names are its field names. A preset says how its
+SPEC.md, "Codec 16: wavelet", is normative; names are its field names. A preset defines how its
 encoder chooses a ``Plan``.
 """
 
@@ -34,7 +34,7 @@ from mcz.model.types import Bools, Floats, Ints
 
 NAME = "wavelet"
 LEAST_FRAMES = 256  # of a segment: in fewer, hundreds of channels would cost more than they save
-INWARD = 1 / 16  # of a step: how far a scaled detail is set back towards zero (MRDWT-34)
+INWARD = 1 / 16  # of a step: distance that a scaled detail is set back towards zero (MRDWT-34)
 
 TAPS = counted(Float64l, MAX_TAPS)  # MRDWT-06
 
@@ -80,8 +80,8 @@ class Transform:
 class Plan:
     """Encoder decisions before the first segment.
 
-    ``kept``: band by band of the clip, the coarsest first, which coefficients are not to become 0,
-    (coefficients, channels); None: the quantizer decides.
+    ``kept``: band by band of the clip, the coarsest first, mask of coefficients that do not become
+    0, (coefficients, channels); None: the quantizer decides.
     """
 
     name: str
@@ -107,9 +107,9 @@ class Plan:
 def transform_of(
     layout: Layout, wavelet: str, levels: int, *, as_published: bool = False
 ) -> Transform:
-    """The levels that are asked for; where the clip is too short for them, fewer.
+    """The requested levels; fewer if the clip is too short for them.
 
-    ``as_published``: as many as are asked for, however short it is.
+    ``as_published``: all of them for any length.
     """
     wavelet_id, taps = by_name(wavelet)
     levels = levels if layout.n_frames else 0
@@ -152,8 +152,8 @@ def _segments(source: SignalSource, plan: Plan) -> Iterator[Segment]:
 
 def _lengths(layout: Layout, plan: Plan) -> Lengths:
     unit = 1 << plan.levels
-    wanted = min(plan.segment_frames or SEGMENT_FRAMES, layout.most_frames)
-    length = max(unit, -(-wanted // unit) * unit)
+    n_frames = min(plan.segment_frames or SEGMENT_FRAMES, layout.most_frames)
+    length = max(unit, -(-n_frames // unit) * unit)
     if plan.segment_frames >= layout.n_frames:
         length = max(length, layout.n_frames)
     return Lengths(length, bool(plan.segment_frames), unit, LEAST_FRAMES)
@@ -190,8 +190,6 @@ def decode(
 
 
 class _Decoder:
-    """Header and segments of a signal, checked."""
-
     def __init__(self, header: bytes, layout: Layout, spans: Sequence[Span]) -> None:
         fields = parse(WaveletHeader, header, f"{NAME} header")  # CODEC-05
         self.fields, self.layout, self.spans = fields, layout, spans
@@ -234,13 +232,13 @@ class _Decoder:
         n_bands = self.layout.n_resolutions - request.resolution  # MRDWT-04
         ranges = wavelets.needed_ranges(request.start, request.stop, levels, self.wavelet.n_taps)
         # Band 0 is the approximation, band b > 0 the details of level levels + 1 - b.
-        wanted = [ranges[levels], *(ranges[levels + 1 - band] for band in range(1, n_bands))]
-        bands = [np.zeros((stop - start, len(request.groups))) for start, stop in wanted]
-        due = wanted[0][0]
-        # Frames whose coefficients are wanted; the last segment has those beyond the end, too.
+        band_ranges = [ranges[levels], *(ranges[levels + 1 - band] for band in range(1, n_bands))]
+        bands = [np.zeros((stop - start, len(request.groups))) for start, stop in band_ranges]
+        due = band_ranges[0][0]
+        # Frames of the requested coefficients; the last segment has those beyond the end too.
         scales = [self._level(band) for band in range(n_bands)]
-        low = min(need[0] << level for need, level in zip(wanted, scales, strict=True))
-        high = max(need[1] << level for need, level in zip(wanted, scales, strict=True))
+        low = min(need[0] << level for need, level in zip(band_ranges, scales, strict=True))
+        high = max(need[1] << level for need, level in zip(band_ranges, scales, strict=True))
         for index, span in enumerate(self.spans):
             if span.first >= high or (span.stop <= low and span.stop != self.lengths[0]):
                 continue
@@ -248,7 +246,7 @@ class _Decoder:
                 wavelets.own_range(span.first, span.stop, self._level(band), self.lengths)
                 for band in range(n_bands)
             ]
-            pairs = zip(owns, wanted, strict=True)
+            pairs = zip(owns, band_ranges, strict=True)
             if all(own[1] <= need[0] or need[1] <= own[0] for own, need in pairs):
                 continue
             if owns[0][0] > due:
@@ -256,11 +254,11 @@ class _Decoder:
             due = owns[0][1]
             for column, group in enumerate(request.groups):
                 stream = partial(_stream, fetch, index, group)
-                self._fill(bands, column, owns, wanted, stream)
-        if due < wanted[0][1]:  # MRDWT-18
+                self._fill(bands, column, owns, band_ranges, stream)
+        if due < band_ranges[0][1]:  # MRDWT-18
             raise FormatError(
                 f"{NAME}: frames {request.start}:{request.stop} need approximations up to "
-                f"{wanted[0][1]}, there are none from {due} on"
+                f"{band_ranges[0][1]}, there are none from {due} on"
             )
         absent = np.zeros((0, len(request.groups)))
         bands += [absent] * (levels + 1 - n_bands)
@@ -277,18 +275,18 @@ class _Decoder:
         bands: list[Floats],
         column: int,
         owns: list[tuple[int, int]],
-        wanted: list[tuple[int, int]],
+        band_ranges: list[tuple[int, int]],
         stream: Any,
     ) -> None:
         counts = [stop - start for start, stop in owns]
         prefix = [
             min(max(need[1] - own[0], 0), own[1] - own[0])
-            for own, need in zip(owns, wanted, strict=True)
+            for own, need in zip(owns, band_ranges, strict=True)
         ]
         indices, code = parse_streams(stream, counts, prefix, self.coding)
-        for band, (own, need, found) in enumerate(zip(owns, wanted, indices, strict=True)):
+        for band, (own, need, source) in enumerate(zip(owns, band_ranges, indices, strict=True)):
             start = max(own[0], need[0])
-            values = self._values(found[start - own[0] :], code, detail=band > 0)
+            values = self._values(source[start - own[0] :], code, detail=band > 0)
             bands[band][start - need[0] : start - need[0] + len(values), column] = values
 
     def _values(self, indices: Ints, code: int, *, detail: bool) -> Floats:
@@ -305,7 +303,7 @@ def _stream(fetch: Fetch, segment: int, group: int, band: int) -> bytes:
 
 
 def cut(header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[int]) -> bytes:
-    """The header for stored frames first <= f < stop alone."""
+    """The header for stored frames first <= f < stop."""
     fields = parse(WaveletHeader, header, f"{NAME} header")
     fields.coded_frames -= first
     return build(fields, f"{NAME} header")
@@ -324,7 +322,7 @@ BITSTREAM = partial(
 
 
 class Frames:
-    """The signal as it is transformed, unwrapped and without gaps, a window at a time."""
+    """The signal for the transform, unwrapped and interpolated, a window at a time."""
 
     def __init__(self, name: str, source: SignalSource, wavelet: Wavelet, levels: int) -> None:
         self.reader, self.wavelet, self.levels = FrameReader(name, source), wavelet, levels
@@ -344,7 +342,7 @@ class Frames:
         return wavelets.analyze(window, at, first, stop, self.lengths, self.wavelet)
 
     def keep(self, first: int, stop: int) -> None:
-        """Go on to the segment that begins at ``stop``."""
+        """Advance to the segment that begins at ``stop``."""
         unit = 1 << self.levels
         n_kept = -(-self.wavelet.lead(self.levels) // unit) * unit
         all_ = np.concatenate([self.history, self.block[: stop - first]])

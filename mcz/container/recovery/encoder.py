@@ -1,4 +1,4 @@
-"""Recovery data made of a stream: hashes, recovery blocks, and all of it as packets."""
+"""Recovery data of a stream: hashes, recovery blocks, and their packets."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mcz.container.recovery.code import LANE, Ints, encode_blocks, runs_of
+from mcz.container.recovery.code import LANE, encode_blocks, run_length
 from mcz.container.recovery.layout import Key, Shape, build_packet, short_hash
 from mcz.errors import AccessError, reason_of
+from mcz.model.types import Ints
 
 READ = Callable[[int], bytes]  # a data block, its padding with it
 AT_ONCE = 1 << 26  # bytes of the blocks of a run that are in memory
@@ -44,7 +45,7 @@ def _packets(key: Key, read: READ, hashes: bytes, step: Step | None) -> Iterator
 
 
 def table_sections(shape: Shape, hashes: bytes) -> Ints:
-    """The sections of the table, and those computed from them, a row each."""
+    """The sections of the table, and the parity sections, a row each."""
     whole = hashes.ljust(shape.n_sections * shape.section_size, b"\0")
     own = np.frombuffer(whole, "<i8").reshape(shape.n_sections, -1).astype(np.int64)
     lanes = own.shape[1]
@@ -54,17 +55,17 @@ def table_sections(shape: Shape, hashes: bytes) -> Ints:
 
 @contextmanager
 def _recovery_blocks(shape: Shape, read: READ, step: Step | None) -> Iterator[READ]:
-    """A function that gives each recovery block; of many some lanes are computed at a time.
+    """A function that returns each recovery block; large ones are computed some lanes at a time.
 
-    Raises AccessError where there is no room for them while they are made.
+    Raises AccessError if there is no room for them meanwhile.
     """
     total = shape.n_recovery * shape.block_size
     with ExitStack() as stack:
         try:
             spool = BytesIO() if total <= IN_MEMORY else tempfile.TemporaryFile()  # noqa: SIM115
             stack.callback(_close, spool)
-            for lane, found in compute_lanes(shape, read, step):
-                for index, part in enumerate(found):
+            for lane, lane_blocks in compute_lanes(shape, read, step):
+                for index, part in enumerate(lane_blocks):
                     spool.seek(index * shape.block_size + LANE * lane)
                     spool.write(part.tobytes())
             spool.flush()
@@ -83,14 +84,14 @@ def _recovery_blocks(shape: Shape, read: READ, step: Step | None) -> Iterator[RE
 
 
 def _close(spool: BinaryIO) -> None:
-    with suppress(OSError):  # of a full disk, which has been told
+    with suppress(OSError):  # the full disk is already reported
         spool.close()
 
 
 def compute_lanes(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int, Ints]]:
     """Lanes of all recovery blocks, of large ones some at a time, and the first of them."""
     lanes = shape.block_size // LANE
-    width = max(1, min(lanes, AT_ONCE // (runs_of(shape.n_recovery) * LANE)))
+    width = max(1, min(lanes, AT_ONCE // (run_length(shape.n_recovery) * LANE)))
     for start in range(0, lanes, width):
         stop = min(start + width, lanes)
         rows = _lane_reader(shape, read, start, stop, step)
@@ -102,12 +103,12 @@ def _lane_reader(
 ) -> Callable[[int, int], Ints]:
 
     def rows(first: int, last: int) -> Ints:
-        found = np.empty((last - first, stop - start), np.int64)
+        result = np.empty((last - first, stop - start), np.int64)
         for at in range(first, last):
             data = memoryview(read(at))[LANE * start : LANE * stop]
-            found[at - first] = np.frombuffer(data, "<i8")
+            result[at - first] = np.frombuffer(data, "<i8")
             if step is not None:
                 step(at, shape.n_blocks)
-        return found
+        return result
 
     return rows

@@ -1,7 +1,7 @@
-"""Layout of protected blocks, and the packets of a RECV, each of which says what it belongs to.
+"""Layout of protected blocks, and the packets of a RECV, each with its key.
 
-A RECV protects the bytes before it, from ``start`` on, and the ``t_size`` bytes behind it; together
-they are the *stream*, cut into blocks.
+A RECV protects the bytes before it, from ``start`` on, and ``t_size`` bytes after it; together they
+are the *stream*, cut into blocks.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ import construct
 from construct import Int8ul, Int32ul, Int64ul
 
 from mcz.container.chunks import FRAMING, HEADER
-from mcz.container.recovery.code import LANE, MOST_POINTS, runs_of
+from mcz.container.recovery.code import LANE, MOST_POINTS, run_length
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError, OptionError
 from mcz.model.schema import Exactly, Record, bounded, build, field, parse_until
 
 HASH = 8  # bytes of the hash of a block
-SECTION = 128  # bytes of a section of the table, where it has so many
-HEAD = 69  # bytes of a packet beside its body: 61 before it, 8 behind
+SECTION = 128  # bytes of a section of the table, unless it is shorter
+HEAD = 69  # bytes of a packet outside of its body: 61 before it, 8 after
 LEAST_BLOCK, MOST_BLOCKS = 256, 1 << 15
-LEAST_RECOVERY = 4  # blocks, so that a small file can take some bad places
+LEAST_RECOVERY = 4  # blocks, so that a small file survives some bad places
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Sizes of what is protected and of the code; all else follows from them.
+    """Sizes of the protected bytes and of the code, from which the rest follows.
 
-    The stream is bytes ``start`` to ``start + a_size`` of the file, which the RECV begins at, and
-    the ``t_size`` bytes behind the RECV.
+    The stream is bytes ``start`` to ``start + a_size`` of the file, the end of which the RECV
+    follows, and the ``t_size`` bytes after the RECV.
     """
 
     start: int
@@ -47,7 +47,7 @@ class Shape:
         sound = self.block_size % LANE == 0 < self.block_size and self.n_recovery > 0
         if not sound or not self.size:
             raise FormatError(f"recovery data: {self}")
-        if runs_of(self.n_recovery) + self.n_blocks > MOST_POINTS:
+        if run_length(self.n_recovery) + self.n_blocks > MOST_POINTS:
             raise LimitError(f"recovery data: {self.n_blocks} and {self.n_recovery} blocks")
 
     @property
@@ -92,7 +92,7 @@ class Shape:
 
     @property
     def burst(self) -> int:
-        """Bytes in a row that may be bad wherever they lie, if nothing else is."""
+        """Length of a run of bad bytes, anywhere, that can be restored if all others are good."""
         return (self.n_recovery - 1) * self.block_size + 1
 
     def packets(self) -> Iterator[tuple[int, int, int]]:
@@ -107,26 +107,26 @@ class Shape:
             at += HEAD + (self.block_size if kind else self.section_size)
 
     def pieces(self, block: int) -> list[tuple[int, int]]:
-        """Offset in the file and size of the pieces of a data block, padding left out."""
+        """Offset in the file and size of the pieces of a data block, without padding."""
         first = block * self.block_size
         stop = min(first + self.block_size, self.size)
         behind = self.chunk_size + self.start
-        found = []
+        ranges = []
         if first < self.a_size:
-            found.append((self.start + first, min(stop, self.a_size) - first))
+            ranges.append((self.start + first, min(stop, self.a_size) - first))
         if stop > self.a_size:
             own = max(first, self.a_size)
-            found.append((behind + own, stop - own))
-        return found
+            ranges.append((behind + own, stop - own))
+        return ranges
 
     def block(self, number: int, read: Callable[[int, int], bytes]) -> bytes:
-        """A data block and its padding; ``read`` gives bytes of the file by offset and size."""
+        """A data block and its padding; ``read`` returns bytes of the file by offset and size."""
         data = b"".join(read(offset, size) for offset, size in self.pieces(number))
         return data.ljust(self.block_size, b"\0")
 
 
 def check_redundancy(redundancy: float) -> None:
-    """Raise OptionError for what is no share."""
+    """Raise OptionError unless the redundancy is a share."""
     if not 0 < redundancy <= 1:
         raise OptionError(f"redundancy is {redundancy:g}, not above 0 and at most 1")
 
@@ -138,8 +138,8 @@ def shape_for(start: int, a_size: int, t_size: int, redundancy: float) -> Shape:
     block = max(LEAST_BLOCK, isqrt(4 * size), -(-size // MOST_BLOCKS))
     block = -(-block // LANE) * LANE
     n_blocks = -(-size // block)
-    wanted = max(LEAST_RECOVERY, ceil(redundancy * n_blocks))
-    return Shape(start, a_size, t_size, block, wanted)
+    n_recovery = max(LEAST_RECOVERY, ceil(redundancy * n_blocks))
+    return Shape(start, a_size, t_size, block, n_recovery)
 
 
 MAGIC = b"\x89RCV\r\n\x1a\n"
@@ -160,7 +160,7 @@ def shape_of(packet: RecvPacket) -> Shape:
 
 
 class RecvPacket(Record):
-    """A packet of RECV, its body and the check behind that included."""
+    """A packet of RECV, with its body and check."""
 
     magic: bytes = field(construct.Const(MAGIC), "`89 52 43 56 0D 0A 1A 0A`", default=MAGIC)
     kind: int = field(bounded(Int8ul, 0, 1), "0 section of the table, 1 recovery block")
@@ -184,7 +184,7 @@ class Key(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """A packet as it was found at ``offset``, which need not be its place."""
+    """A packet found at ``offset``, which need not be its place."""
 
     kind: int
     index: int
@@ -215,7 +215,7 @@ def build_packet(key: Key, kind: int, index: int, body: bytes) -> bytes:
 
 
 def read_packet(source: ByteSource, offset: int) -> tuple[Key, Packet] | None:
-    """The packet at ``offset``, or None where there is no whole one."""
+    """The packet at ``offset``, or None if there is no intact one."""
     try:
         head = parse_until(RecvPacket, source.read(offset, BODY_AT), "RECV", "body")
         shape, size = shape_of(head), body_size(head)
@@ -230,13 +230,13 @@ def read_packet(source: ByteSource, offset: int) -> tuple[Key, Packet] | None:
 
 
 def find_packets(source: ByteSource) -> Iterator[tuple[Key, Packet]]:
-    """Every whole packet of a file, wherever it lies and whatever else is there."""
+    """Every intact packet of a file, at any offset."""
     mark = re.compile(re.escape(MAGIC))
     start = 0
     while start < source.size:
         data = source.read(start, min(WINDOW + len(MAGIC) - 1, source.size - start))
         for match in mark.finditer(data):
-            found = read_packet(source, start + match.start())
-            if found is not None:
-                yield found
+            packet = read_packet(source, start + match.start())
+            if packet is not None:
+                yield packet
         start += WINDOW

@@ -1,5 +1,5 @@
-"""Motions from and for what other libraries hold in memory; docs/guides/adapters.md has the table.
+"""Motions from and to objects of other libraries; docs/guides/adapters.md has the table.
 
-Each library is imported when a motion is wanted for it. What it holds in binary64 is kept exactly;
-what it cannot hold is refused, or left out as the table says.
+Each library is imported on first use. Its binary64 numbers are kept exactly; contents that it
+cannot hold are refused, or left out by that table.
 """

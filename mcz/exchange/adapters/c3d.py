@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 
 def from_c3d(reader: Reader, *, name: str = "motion") -> Motion:
-    """The motion in the file of a ``c3d.Reader``, or in what a ``c3d.Writer`` would write.
+    """The motion in the file of a ``c3d.Reader``, or in the output of a ``c3d.Writer``.
 
-    It is all that the file says, with its source. Raises SourceError for what is no C3D,
+    It has all contents of the file, with its source. Raises SourceError for a malformed C3D,
     OptionError where the file of the reader is closed.
     """
     if hasattr(reader, "read_frames"):
@@ -49,14 +49,14 @@ def from_c3d(reader: Reader, *, name: str = "motion") -> Motion:
 def to_c3d(motion: Motion) -> Reader:
     """``motion`` as a ``c3d.Reader``; needs c3d (``mcz[c3d]``).
 
-    It reads the C3D file of the motion, its source's where it has one, from memory; its
-    ``to_writer`` is for who goes on to change it. Raises MotionError where c3d cannot read that
-    file, and as ``mcz.convert(motion, "c3d")`` does.
+    It reads the C3D file of the motion, its source's if it has one, from memory; its ``to_writer``
+    allows changes. Raises MotionError where c3d cannot read that file, and as ``mcz.convert(motion,
+    "c3d")``.
     """
     c3d, data = import_extra("c3d", "c3d"), c3d_bytes(motion)
     try:
         return c3d.Reader(io.BytesIO(data))
-    except Exception as error:  # it raises whatever its parser met, AssertionError among others
+    except Exception as error:  # it raises any exception of its parser, such as AssertionError
         raise MotionError(f"c3d cannot read it: {error}", clip=motion.name) from error
 
 
@@ -73,8 +73,8 @@ def c3d_bytes(motion: Motion) -> bytes:
     return data
 
 
-Held = dict[str | None, tuple[NDArray[np.float64], NDArray[np.bool_]]]
-OUTPUTS = "outputs"  # the role of the signal of what models gave, which ezc3d has among the points
+RoleArrays = dict[str | None, tuple[NDArray[np.float64], NDArray[np.bool_]]]
+OUTPUTS = "outputs"  # the role of the signal of outputs of models, which ezc3d has among the points
 REFUSED = (OSError, ValueError, RuntimeError, LookupError)  # what ezc3d raises
 NOTE = "numbers that binary32 cannot hold: without the events and parameters of its C3D"
 
@@ -82,22 +82,22 @@ NOTE = "numbers that binary32 cannot hold: without the events and parameters of 
 def from_ezc3d(c3d: object, *, name: str = "motion") -> Motion:
     """The motion in an ``ezc3d.c3d``: points, residuals, outputs of models, analog, events.
 
-    It is that of the file which ezc3d writes, with its source. Where points or analog samples are
-    numbers that such a file would round to binary32, filtered ones for example, they are kept and
-    the source is not, nor events and parameters; the ``source-note`` of the metadata says so.
-    Raises OptionError where ezc3d cannot write the file, and SourceError.
+    It is the motion in the file that ezc3d writes, with its source. If points or analog samples are
+    numbers that such a file would round to binary32, filtered ones for example, they are kept, but
+    not the source, events and parameters; the ``source-note`` of the metadata mentions it. Raises
+    OptionError where ezc3d cannot write the file, and SourceError.
     """
     if not hasattr(c3d, "write"):
-        raise OptionError(f"a {type(c3d).__name__} is no ezc3d.c3d; mcz.read reads files")
+        raise OptionError(f"a {type(c3d).__name__} is not an ezc3d.c3d; mcz.read reads files")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "motion.c3d")
         try:
             c3d.write(str(path))
         except REFUSED as error:
-            raise OptionError(f"ezc3d cannot write what it holds: {error}") from error
+            raise OptionError(f"ezc3d cannot write it: {error}") from error
         motion: Motion = FORMATS["c3d"].read(path.read_bytes(), name)
-    held = _held(c3d, motion)
-    signals = tuple(_exact(signal, held) for signal in motion.signals)
+    arrays = _arrays_by_role(c3d, motion)
+    signals = tuple(_with_numbers(signal, arrays) for signal in motion.signals)
     if all(own is other for own, other in zip(signals, motion.signals, strict=True)):
         return motion
     note = "; ".join(filter(None, (motion.metadata.get("source-note"), NOTE)))
@@ -108,9 +108,9 @@ def from_ezc3d(c3d: object, *, name: str = "motion") -> Motion:
 def to_ezc3d(motion: Motion) -> c3d:
     """``motion`` as an ``ezc3d.c3d``; needs ezc3d (``mcz[ezc3d]``).
 
-    It has what the C3D file of the motion says (``mcz.to_c3d``), with points and analog samples in
-    binary64; ezc3d writes them as binary32. Gaps are NaN. Raises MotionError where ezc3d cannot
-    read that file, and as ``mcz.convert(motion, "c3d")`` does.
+    It has the contents of the C3D file of the motion (``mcz.to_c3d``), with points and analog
+    samples in binary64; ezc3d writes them as binary32. Unknown values are NaN. Raises MotionError
+    where ezc3d cannot read that file, and as ``mcz.convert(motion, "c3d")``.
     """
     ezc3d = import_extra("ezc3d", "ezc3d")
     plain = for_c3d(motion)
@@ -122,10 +122,10 @@ def to_ezc3d(motion: Motion) -> c3d:
             made = ezc3d.c3d(str(path))
         except REFUSED as error:
             raise MotionError(f"ezc3d cannot read it: {error}", clip=motion.name) from error
-    held = _held(made, FORMATS["c3d"].read(data, motion.name))
+    arrays = _arrays_by_role(made, FORMATS["c3d"].read(data, motion.name))
     for signal in plain.signals:
-        if signal.role in held:
-            array, chosen = held[signal.role]
+        if signal.role in arrays:
+            array, chosen = arrays[signal.role]
             there, values = array[chosen], signal.masked().T
             if there.size != values.size:
                 raise MotionError(
@@ -137,14 +137,14 @@ def to_ezc3d(motion: Motion) -> c3d:
     return made
 
 
-def _held(held: c3d, motion: Motion) -> Held:
-    """By the roles of signals of ``motion``, an array of ezc3d, time last, and which rows count.
+def _arrays_by_role(data: c3d, motion: Motion) -> RoleArrays:
+    """By the roles of signals of ``motion``, an array of ezc3d, time last, and the rows to use.
 
-    Residuals are none of them: they are as ezc3d has read or written them.
+    Residuals are not among them: ezc3d keeps them unchanged.
     """
-    told = recording(motion)
-    is_point = np.array([not point.groups for point in told.points] if told else [], np.bool_)
-    places, samples = held["data"]["points"][:3].transpose(1, 0, 2), held["data"]["analogs"][0]
+    facts = recording(motion)
+    is_point = np.array([not point.groups for point in facts.points] if facts else [], np.bool_)
+    places, samples = (data["data"]["points"][:3].transpose(1, 0, 2), data["data"]["analogs"][0])
     if len(places) != len(is_point):
         raise MotionError(
             f"ezc3d has {len(places)} points, and the C3D {len(is_point)}", clip=motion.name
@@ -156,11 +156,11 @@ def _held(held: c3d, motion: Motion) -> Held:
     }
 
 
-def _exact(signal: Signal, held: Held) -> Signal:
-    """``signal``, in binary64 where it has not the numbers that ezc3d holds."""
-    if signal.role not in held or not signal.values.size:
+def _with_numbers(signal: Signal, arrays: RoleArrays) -> Signal:
+    """``signal``, in binary64 if its numbers differ from ezc3d's."""
+    if signal.role not in arrays or not signal.values.size:
         return signal
-    array, chosen = held[signal.role]
+    array, chosen = arrays[signal.role]
     rows = array[chosen]
     values = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]).T, np.float64)
     if np.array_equal(signal.masked(), values, equal_nan=True):

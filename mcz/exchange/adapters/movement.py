@@ -17,28 +17,28 @@ from mcz.model.extras import import_extra
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.skeleton import AXES
-from mcz.model.types import JsonObject, Reals, Values
+from mcz.model.types import Floats, JsonObject, Reals, Values
 from mcz.model.units import UNIT_CM
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset
 
-Floats = NDArray[np.float64]
 DIMS = ("time", "space", "keypoints", "individuals")
-SINGULAR = {"keypoint": "keypoints", "individual": "individuals"}  # as other versions call them
+# names of dimensions in other versions
+SINGULAR = {"keypoint": "keypoints", "individual": "individuals"}
 CONFIDENCE = "confidence"  # the signal of it
-SEPARATOR = ":"  # of an individual and its keypoint, as labels of C3D have it
-SLACK = 1e-3  # frames by which a time may be off
+SEPARATOR = ":"  # between an individual and its keypoint, as in labels of C3D
+SLACK = 1e-3  # greatest deviation of a time, in frames
 
 
 def to_movement(motion: Motion, *, unit: str | None = None) -> Dataset:
     """The points of a motion as a poses dataset of ``movement``; needs xarray (``mcz[xarray]``).
 
     ``position`` (time, space, keypoints, individuals) in length units or ``unit``, NaN where
-    unknown; ``confidence`` is that of a motion that has it, else 1, and 0 where a point is unknown.
-    Times are those of ``mcz.times``, frames from 0 on while they are unknown. Points
-    called ``individual:keypoint`` are individuals, where all of these have the same keypoints;
-    otherwise there is one, called as the motion. Raises as ``mcz.positions`` does.
+    unknown; ``confidence`` is the motion's if it has one, else 1, and 0 where a point is unknown.
+    Times are those of ``mcz.times``, frames from 0 on if unknown. Points called
+    ``individual:keypoint`` are individuals, if all of these have the same keypoints; otherwise
+    there is one, with the name of the motion. Raises as ``mcz.positions``.
     """
     xarray = import_extra("xarray", "xarray")
     names = point_names(motion.skeleton)
@@ -81,21 +81,22 @@ def from_movement(
 ) -> Motion:
     """A poses dataset of ``movement``, or any of its layout, as markers.
 
-    Keypoints of several individuals are called ``individual:keypoint``. NaN is a gap; a confidence
-    that says anything is a signal ``confidence``. Positions keep their float32 or float64 numbers.
-    Times are kept, frame numbers are those of the times, from 1 on, or of the frames from the first
-    time on. Other variables and attributes are left out. ``unit`` and ``up`` say what the dataset
-    does not. Raises OptionError for another layout, and for times that are no frames of its rate.
+    Keypoints of several individuals are called ``individual:keypoint``. NaN is an unknown position;
+    a confidence that varies is a signal ``confidence``. Positions keep their float32 or float64
+    numbers. Times are kept; frame numbers follow the times, from 1 on, or the frames from the first
+    time on. Other variables and attributes are left out. ``unit`` and ``up`` state facts that the
+    dataset lacks. Raises OptionError for another layout, and for times that are not at frames of
+    its rate.
     """
     if not hasattr(dataset, "data_vars") or "position" not in dataset:
         raise OptionError("no poses dataset of movement: it has no variable 'position'")
-    found = _ordered(dataset["position"], DIMS)
-    space = [str(axis) for axis in found["space"].values]
+    position = _ordered(dataset["position"], DIMS)
+    space = [str(axis) for axis in position["space"].values]
     if space not in (["x", "y"], ["x", "y", "z"]):
         raise OptionError(f"positions along {', '.join(space)}, not x, y or x, y, z")
-    places = found.values.transpose(0, 3, 2, 1)
-    keypoints = [str(each) for each in found["keypoints"].values]
-    individuals = [str(each) for each in found["individuals"].values]
+    places = position.values.transpose(0, 3, 2, 1)
+    keypoints = [str(each) for each in position["keypoints"].values]
+    individuals = [str(each) for each in position["individuals"].values]
     names = keypoints
     if len(individuals) != 1:
         names = [SEPARATOR.join((one, key)) for one in individuals for key in keypoints]
@@ -108,7 +109,7 @@ def from_movement(
             of_points = tuple(Channel("", each) for each in names)
             made = _signal(sure.reshape(len(sure), -1), CONFIDENCE, of_points)
             signals.append(replace(made, role=CONFIDENCE))
-    times = np.asarray(found["time"].values, np.float64)
+    times = np.asarray(position["time"].values, np.float64)
     rate, numbers = _frames(dataset, times, name)
     facts = dataset.attrs
     unit = unit or (facts.get("length_unit") if facts.get("length_unit") in UNIT_CM else None)
@@ -134,7 +135,6 @@ def _grid_of(names: tuple[str, ...], name: str) -> tuple[list[str], list[str]]:
 
 
 def _confidence(motion: Motion, places: Reals) -> Floats:
-    """Confidence of every point in every frame."""
     for signal in motion.signals[1:]:
         if signal.role == CONFIDENCE and signal.n_channels == places.shape[1] * places.shape[2]:
             return np.asarray(signal.masked(), np.float64)
@@ -142,7 +142,7 @@ def _confidence(motion: Motion, places: Reals) -> Floats:
 
 
 def _ordered(array: DataArray, dims: tuple[str, ...]) -> DataArray:
-    """The array with its axes in this order; raises OptionError where it has others."""
+    """The array with its axes in this order; raises OptionError for other axes."""
     array = array.rename({old: new for old, new in SINGULAR.items() if old in array.dims})
     if set(array.dims) != set(dims):
         shown = ", ".join(map(str, array.dims))
@@ -173,14 +173,14 @@ def _frames(
     fps = dataset.attrs.get("fps")
     in_seconds = dataset.attrs.get("time_unit", "seconds" if fps else "frames") == "seconds"
     if fps is None and in_seconds:
-        raise OptionError("times in seconds, and no attribute 'fps' that says how many frames")
+        raise OptionError("times in seconds without an attribute 'fps'")
     counted = times if fps is None or not in_seconds else times * float(fps)
     numbers = np.rint(counted)
     if not (np.abs(counted - numbers) <= SLACK).all():
         counted = counted - counted[:1]
         numbers = np.rint(counted)
     if not (np.abs(counted - numbers) <= SLACK).all():
-        raise OptionError(f"times that are no frames of {fps or 1} a second")
-    found = numbers.astype(np.int64) + 1
+        raise OptionError(f"times that are not at frames of {fps or 1} a second")
+    counts = numbers.astype(np.int64) + 1
     rate = None if fps is None else frame_rate_of(fps, name)
-    return rate, None if (found == np.arange(1, len(found) + 1)).all() else found
+    return rate, None if (counts == np.arange(1, len(counts) + 1)).all() else counts

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion.hierarchy import is_bvh, to_bvh
@@ -24,23 +23,22 @@ from mcz.model.motion import (
     Skeleton,
     check_poses,
 )
+from mcz.model.types import Floats
 from mcz.sources.tables.times import frame_rate
 
 if TYPE_CHECKING:
     from pybvh import Bvh
     from pybvh.bvhnode import BvhJoint
 
-Floats = NDArray[np.float64]
-
 
 def from_pybvh(bvh: Bvh, *, unit: str | None = None, up: str | None = None) -> Motion:
-    """The motion in a ``pybvh.Bvh``, its numbers as they are: angles in radians.
+    """The motion in a ``pybvh.Bvh``, its numbers unchanged: angles in radians.
 
-    The root's positions replace its offset, as they do in pybvh. ``unit`` ("cm", "m", ...) and
-    ``up`` ("x" to "-z") say what it does not. Raises OptionError for another one.
+    The root's positions replace its offset, as in pybvh. ``unit`` ("cm", "m", ...) and ``up`` ("x"
+    to "-z") state facts that it lacks. Raises OptionError for another one.
     """
     if not hasattr(bvh, "joint_angles"):
-        raise OptionError(f"a {type(bvh).__name__} is no pybvh.Bvh; mcz.read reads files")
+        raise OptionError(f"a {type(bvh).__name__} is not a pybvh.Bvh; mcz.read reads files")
     nodes = [node for node in bvh.nodes if not node.is_end_site()]
     ends = [node for node in bvh.nodes if node.is_end_site()]
     numbers = {id(node): number for number, node in enumerate(nodes)}
@@ -71,9 +69,10 @@ def from_pybvh(bvh: Bvh, *, unit: str | None = None, up: str | None = None) -> M
 def to_pybvh(motion: Motion) -> Bvh:
     """``motion`` as a ``pybvh.Bvh``; needs pybvh (``mcz[pybvh]``).
 
-    Angles in radians are kept as they are, those in degrees are converted; another skeleton becomes
-    joints of BVH first, as ``mcz.convert`` does it. Raises MotionError where pybvh cannot hold it:
-    gaps, several roots, joints that change their place, markers, signals beside the motion.
+    Angles in radians are kept, those in degrees are converted; another skeleton becomes joints of
+    BVH first, as in ``mcz.convert``. Raises MotionError where pybvh cannot hold it: unknown values,
+    several roots, joints that move relative to their parent, markers, signals other than the
+    motion.
     """
     pybvh = import_extra("pybvh", "pybvh")
     check_poses(motion.name, motion.signals[0])
@@ -94,7 +93,7 @@ def to_pybvh(motion: Motion) -> Bvh:
             parent.children = [*parent.children, made[joint]]
         nodes.append(made[joint])
         for at, tail in enumerate(tree.joints[joint].tails):
-            end = f"EndSite{name}" + (f"#{at}" if at else "")  # as pybvh itself calls them
+            end = f"EndSite{name}" + (f"#{at}" if at else "")  # the names that pybvh uses
             site = pybvh.bvhnode.BvhEndSite(end, np.array(tail), made[joint])
             made[joint].children = [*made[joint].children, site]
             nodes.append(site)
@@ -110,7 +109,7 @@ def to_pybvh(motion: Motion) -> Bvh:
 
 
 class _Tree:
-    """A motion whose joints have three angles and do not change their places, but for the root."""
+    """A motion whose joints have three angles and keep their offsets, except the root."""
 
     def __init__(self, motion: Motion) -> None:
         if not np.isfinite(motion.values).all():
@@ -148,11 +147,13 @@ class _Tree:
             raise MotionError(
                 f"joint {self.names[joint]!r}: pybvh has no channels {' '.join(kinds)}"
             )
-        found = np.zeros((len(self.values), 3))
+        angles = np.zeros((len(self.values), 3))
         columns = [self.starts[joint] + kinds.index(kind) for kind in own]
-        found[:, : len(own)] = self.values[:, columns]
+        angles[:, : len(own)] = self.values[:, columns]
         order = [*own, *(kind for kind in ROTATION_KINDS if kind not in own)]
-        return [kind[1].upper() for kind in order], np.deg2rad(found) if self.to_radians else found
+        return [kind[1].upper() for kind in order], np.deg2rad(
+            angles
+        ) if self.to_radians else angles
 
     def root_places(self) -> Floats:
         """Positions of the root, (n_frames, 3): in pybvh they replace its offset."""
@@ -160,16 +161,18 @@ class _Tree:
 
     def _places(self, joint: int) -> Floats:
         """Positions of a joint relative to its parent, (n_frames, 3)."""
-        found = np.tile(np.array(self.joints[joint].offset), (len(self.values), 1))
+        positions = np.tile(np.array(self.joints[joint].offset), (len(self.values), 1))
         for number, channel in enumerate(self.joints[joint].channels):
             if channel.kind in POSITION_KINDS:
                 axis = POSITION_KINDS.index(channel.kind)
                 own = self.values[:, self.starts[joint] + number]
-                found[:, axis] = found[:, axis] + own if self.joints[joint].adds_to_offset else own
-        return found
+                positions[:, axis] = (
+                    positions[:, axis] + own if self.joints[joint].adds_to_offset else own
+                )
+        return positions
 
     def _offset(self, joint: int) -> Floats:
-        """A joint's offset; that of a joint with positions is where these leave it."""
+        """A joint's offset; the position that position channels keep it at, if it has some."""
         if joint == 0:
             return np.array(self.joints[0].offset)
         places = self._places(joint)

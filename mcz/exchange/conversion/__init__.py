@@ -1,4 +1,4 @@
-"""A motion for another format: the same points over time, said in its words."""
+"""A motion for another format: the same points over time, in its terms."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion.hierarchy import to_amc, to_bvh
-from mcz.exchange.conversion.losses import COUNTING, held, left_out, with_counted_times
+from mcz.exchange.conversion.losses import COUNTING, left_out, with_counted_times, with_held_signals
 from mcz.exchange.conversion.marker_fit import Fit, from_positions
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import Hint
@@ -20,13 +20,13 @@ from mcz.model.motion import Motion
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources import FORMATS
 
-PRINTED = Grid(GridKind.FIXED, 6)  # of points that are computed: far below noise
+PRINTED = Grid(GridKind.FIXED, 6)  # of computed points: far below noise
 
 
 def to_trc(motion: Motion) -> Motion:
-    """Its points as markers of their names, in mm where the length unit is known.
+    """The points as markers of their names, in mm where the length unit is known.
 
-    A motion of markers is returned as it is.
+    A motion of markers is returned unchanged.
     """
     made = to_c3d(motion)
     signal = made.signals[0]
@@ -51,9 +51,9 @@ MM_PER_CM = 10.0
 
 
 def to_c3d(motion: Motion) -> Motion:
-    """Its points as markers of their names, in mm where the length unit is known.
+    """The points as markers of their names, in mm where the length unit is known.
 
-    A motion of markers is returned as it is. A point whose position is not known is invalid.
+    A motion of markers is returned unchanged. A point with an unknown position is invalid.
     """
     made = in_positions(motion)
     unit_cm = motion.skeleton.unit_cm
@@ -95,12 +95,12 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     """``motion`` on a skeleton that files of the format ``to`` can hold: a key of ``TARGETS``.
 
     Its points are at the same positions, in the same order wherever both formats have the same
-    points, to 1e-9 of the skeleton's size; numbers that are computed have a grid of 6 decimals,
-    which they are rounded to when they are printed. It has no source: it prints plainly.
-    ``rate`` is the frame rate, in place of the motion's own.
+    points, to 1e-9 of the skeleton's size; computed numbers have a grid of 6 decimals, to which
+    they are rounded when printed. It has no source: it prints plainly. ``rate`` replaces the frame
+    rate of the motion.
 
-    Raises MotionError, with the reason, where that format cannot say what the motion says, and
-    OptionError for an unknown format or a frame rate that is needed and unknown.
+    Raises MotionError, with the reason, if that format cannot hold the motion, and OptionError for
+    an unknown format or a frame rate that is needed and unknown.
     """
     if to not in TARGETS:
         scene = "; mcz.to_glb writes scenes" if to in ("glb", "gltf") else ""
@@ -115,18 +115,18 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
             hint=Hint.RATE,
         )
     timeline = motion.timeline
-    if timeline is not None and FORMATS[to].is_table:  # prints what the source prints
+    if timeline is not None and FORMATS[to].is_table:  # prints as the source
         timeline = Timeline(timeline.times, timeline.rate)
-    made = replace(TARGETS[to](held(motion, to)), source=None).at_times(timeline)
+    made = replace(TARGETS[to](with_held_signals(motion, to)), source=None).at_times(timeline)
     return with_counted_times(made, to) if to in COUNTING else made
 
 
 def converted_files(
     motion: Motion, to: str, rate: Fraction | float | None = None, with_skeleton: bool = False
 ) -> dict[str, bytes]:
-    """The plain file of ``convert``, under ``to``, and with an AMC its ASF under "asf" if wanted.
+    """The plain file of ``convert``, under ``to``, and of an AMC its ASF under "asf" if requested.
 
-    Raises MotionError and OptionError as ``convert`` does.
+    Raises MotionError and OptionError as ``convert``.
     """
     converted = convert(motion, to, rate)
     files: dict[str, bytes] = {to: FORMATS[to].write(converted)}

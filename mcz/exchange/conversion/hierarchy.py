@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.exchange.conversion.losses import first_gap
@@ -30,18 +29,18 @@ from mcz.model.numbers import Grid, GridKind
 from mcz.sources.text.bvh import with_positions
 
 PRINTED = Grid(GridKind.FIXED, 6)  # degrees and units: a millionth of either is far below noise
-TINY = 1e-13  # radians; what rounding makes of an angle of zero
+TINY = 1e-13  # radians; rounding error of an angle of zero
 STRETCHING = ("sx", "sy", "sz", "length")
 BVH_KINDS = {"", *POSITION_KINDS, *ROTATION_KINDS, "sx", "sy", "sz"}
 
 
 def to_bvh(motion: Motion) -> Motion:
-    """``motion`` on joints of BVH; unchanged where its own are such."""
+    """``motion`` on joints of BVH; unchanged if it has such joints."""
     skeleton = motion.skeleton
     _check(motion)
     if is_bvh(skeleton):
         return _unmistakable(motion)
-    Chain(skeleton)  # refuses what has no kinematics
+    Chain(skeleton)  # refuses a skeleton without kinematics
     values = np.asarray(motion.values, np.float64)
     joints: list[Joint] = []
     columns: list[Floats] = []
@@ -66,10 +65,10 @@ def to_bvh(motion: Motion) -> Motion:
             kinds = tuple(Channel(kind) for kind in POSITION_KINDS)
             joints.append(Joint(name, numbers[index], channels=kinds))
     made = np.stack(columns, axis=1) if columns else np.zeros((len(values), 0))
-    return _made(motion, joints, made)
+    return _computed_motion(motion, joints, made)
 
 
-def _made(motion: Motion, joints: list[Joint], values: Floats) -> Motion:
+def _computed_motion(motion: Motion, joints: list[Joint], values: Floats) -> Motion:
     signal = Signal(
         values,
         (PRINTED,) * values.shape[1],
@@ -88,9 +87,9 @@ def _made(motion: Motion, joints: list[Joint], values: Floats) -> Motion:
 
 
 def _unmistakable(motion: Motion) -> Motion:
-    """``motion``, its joints without offsets where a reader would take its positions otherwise.
+    """``motion``, its joints without offsets if a reader could misread its positions.
 
-    A BVH does not say whether positions add to the offset; without one it makes no difference.
+    A BVH does not state whether positions add to the offset; without one both are equal.
     """
     joints = motion.skeleton.joints
     values = np.array(motion.values, np.float64)
@@ -108,7 +107,7 @@ def _unmistakable(motion: Motion) -> Motion:
             values[:, column] += offset[component] if joint.adds_to_offset else 0.0
             offset[component] = 0.0
         plain.append(replace(joint, offset=(offset[0], offset[1], offset[2]), adds_to_offset=True))
-    return _made(motion, plain, values)
+    return _computed_motion(motion, plain, values)
 
 
 def is_bvh(skeleton: Skeleton) -> bool:
@@ -123,11 +122,10 @@ def is_bvh(skeleton: Skeleton) -> bool:
 
 
 def _check(motion: Motion) -> None:
-    """Raises MotionError for what no BVH can hold."""
     if point_set(motion.skeleton) == "markers":
         raise MotionError("markers have no skeleton, and BVH needs one", clip=motion.name)
     if not motion.signals[0].has_poses:
-        raise MotionError("BVH holds the channels of a skeleton alone", clip=motion.name)
+        raise MotionError("BVH can hold only the channels of a skeleton", clip=motion.name)
     if gap := first_gap(motion):
         raise MotionError(f"BVH cannot leave out values, but {gap}", clip=motion.name)
     if is_bvh(motion.skeleton):
@@ -152,7 +150,7 @@ def stretches(joint: Joint) -> bool:
 
 
 def loose_tails(skeleton: Skeleton, index: int) -> tuple[Vector, ...]:
-    """The tails of a joint at which no child begins and stays."""
+    """The tails of a joint without a child that begins and stays there."""
     if not skeleton.joints[index].tails:
         return ()
     children = {
@@ -195,10 +193,10 @@ def _tail_positions(skeleton: Skeleton, index: int, values: Floats, tail: Vector
 def _part(
     skeleton: Skeleton, values: Floats, *chosen: tuple[int, tuple[str, ...]]
 ) -> tuple[Chain, Floats]:
-    """A chain of some joints, with channels of some kinds alone, and its values.
+    """A chain of some joints, with only channels of some kinds, and its values.
 
-    Each joint is (index, kinds) and hangs on the one before. Those that do not move are at the
-    origin. The values are (n_channels, n_frames).
+    Each joint is (index, kinds) and is the child of the one before. Joints that do not move are at
+    the origin. The values are (n_channels, n_frames).
     """
     joints, numbers = [], []
     for number, (index, kinds) in enumerate(chosen):
@@ -212,11 +210,8 @@ def _part(
     return Chain(part), np.ascontiguousarray(values[:, numbers].T)
 
 
-Ints = NDArray[np.int64]
-
-
 def to_amc(motion: Motion) -> Motion:
-    """``motion`` on Acclaim bones, its angles as they are; unchanged where its own are such.
+    """``motion`` on Acclaim bones, its angles unchanged; unchanged if it has such bones.
 
     Quaternions and rotation vectors become angles, as in BVH.
     """
@@ -234,7 +229,6 @@ def to_amc(motion: Motion) -> Motion:
 
 
 def _check_acclaim(motion: Motion) -> None:
-    """Raises MotionError for what Acclaim's files cannot hold."""
     skeleton = motion.skeleton
     if point_set(skeleton) == "markers":
         raise MotionError("markers have no skeleton, and AMC needs one", clip=motion.name)
@@ -242,7 +236,7 @@ def _check_acclaim(motion: Motion) -> None:
     if len(roots) != 1:
         raise MotionError(f"ASF has one root, and the skeleton has {len(roots)}: {roots[:8]}")
     if not motion.signals[0].has_poses:
-        raise MotionError("AMC holds the channels of a skeleton alone", clip=motion.name)
+        raise MotionError("AMC can hold only the channels of a skeleton", clip=motion.name)
     for joint in skeleton.joints:
         for channel in joint.channels:
             if channel.kind not in POSITION_KINDS + ROTATION_KINDS:
@@ -273,7 +267,7 @@ class _Bones:
                 starts[index][point] = self._leading(joint, own, point, number)
 
     def _turning(self, index: int, parent: int, tail: Vector) -> int:
-        """Add the bone that turns as joint ``index`` does; returns its number."""
+        """Add the bone that turns as joint ``index`` does; return its number."""
         joint = self.skeleton.joints[index]
         columns = self.skeleton.columns(index)
         kinds = [channel.kind for channel in joint.channels]
@@ -304,11 +298,10 @@ class _Bones:
         return len(self.joints) - 1
 
     def _end(self, bone: int) -> Vector:
-        """Origin of the bones below this one."""
         return self.joints[bone].tails[0] if bone else ORIGIN
 
     def _name(self, name: str) -> str:
-        """``name`` as ASF can hold it, and as no bone has it yet."""
+        """``name`` valid in ASF, and different from all present bones."""
         letters = ("_" if letter <= " " or letter in "()" else letter for letter in name)
         stem = "".join(letters).lstrip("#:") or "joint"
         name, number = stem, 1

@@ -10,25 +10,25 @@ import numpy as np
 from mcz.files.reading.source_info import recording
 from mcz.kinematics import point_set
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
-from mcz.model.clock import EXACT, TIMES, numbers_or_rows
+from mcz.model.clock import TIMES, TOLERANCE, numbers_or_rows
 from mcz.model.motion import Motion
 from mcz.sources.c3d.plain import KNOWN
 from mcz.sources.c3d.recording import Recording, parameters_of
 from mcz.sources.tables.signals import text_columns
 
 MOST_NAMES = 8
-POINTS = ("c3d", "trc")  # what becomes of joints are points
+POINTS = ("c3d", "trc")  # formats in which joints become points
 SCENES = ("glb", "usda")
 GROUPS = ("POINT", "ANALOG", "FORCE_PLATFORM", "EVENT", "TRIAL")  # of C3D, written or named
 SHAPED = ("bvh", "amc", *POINTS, *SCENES)  # a skeleton or its points
 UNNUMBERED = ("bvh", "sto", "mot", *SCENES)
-HELD = {"c3d": KNOWN}  # roles of signals beside the motion, of the formats that hold any
+HELD_ROLES = {"c3d": KNOWN}  # roles of signals other than the motion, of the formats that hold any
 ROOT = "root"  # the only name that ASF has for it
 
 
-def held(motion: Motion, to: str) -> Motion:
-    """``motion`` with the signals alone that a format of ``mcz.convert`` has a place for."""
-    roles = HELD.get(to, ())
+def with_held_signals(motion: Motion, to: str) -> Motion:
+    """``motion`` with only the signals that a format of ``mcz.convert`` can hold."""
+    roles = HELD_ROLES.get(to, ())
     return motion.with_signals(
         [k for k, s in enumerate(motion.signals) if not k or s.role in roles]
     )
@@ -38,7 +38,7 @@ def left_out(motion: Motion, to: str) -> tuple[str, ...]:
     """List the facts of ``motion`` that a file of the format ``to`` cannot hold, a text each.
 
     ``to`` is "csv", "npz", "glb", "usda" or a format of ``mcz.convert``. Metadata are left out of
-    every format, and are not named. What makes a format impossible is an error of the conversion.
+    every format, and are not listed. An impossible conversion raises its own error.
     """
     return tuple(_left_out(motion, to))
 
@@ -46,7 +46,7 @@ def left_out(motion: Motion, to: str) -> tuple[str, ...]:
 def _left_out(motion: Motion, to: str) -> Iterator[str]:
     if to in SHAPED and has_no_lengths(motion.skeleton):
         yield f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
-    known = HELD.get(to, ())
+    known = HELD_ROLES.get(to, ())
     others = [s.name for s in motion.signals[1:] if s.role not in (TIMES, *known)]
     if others:
         yield f"left out: signal {', '.join(others)}"
@@ -66,7 +66,7 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
 
 
 def first_gap(motion: Motion, columns: Sequence[int] | None = None) -> str | None:
-    """Describe the first missing value of ``columns`` by joint and frame; None if all are there."""
+    """Describe the first missing value of ``columns`` by joint and frame; None without any."""
     chosen = range(motion.skeleton.n_channels) if columns is None else columns
     bad = ~np.isfinite(np.asarray(motion.signals[0].masked(), np.float64)[:, chosen])
     if not bad.any():
@@ -94,14 +94,14 @@ def of_text(metadata: Mapping[str, str]) -> Iterator[str]:
         yield f"left out: columns of text: {texts}"
 
 
-def of_recording(told: Recording | None) -> Iterator[str]:
-    """Yield the facts of a C3D beside its numbers, which no other file, nor a plain C3D, has."""
-    if told is None:
+def of_recording(recorded: Recording | None) -> Iterator[str]:
+    """Yield the facts of a C3D besides its numbers, which no other file, nor a plain C3D, has."""
+    if recorded is None:
         return
-    counts = ((len(told.events), "event"), (len(told.platforms), "force platform"))
-    found = [f"{count} {what}{'s' if count > 1 else ''}" for count, what in counts if count]
-    if found:
-        yield f"left out: {', '.join(found)}"
+    counts = ((len(recorded.events), "event"), (len(recorded.platforms), "force platform"))
+    facts = [f"{count} {what}{'s' if count > 1 else ''}" for count, what in counts if count]
+    if facts:
+        yield f"left out: {', '.join(facts)}"
 
 
 def _groups(motion: Motion) -> Iterator[str]:
@@ -109,8 +109,10 @@ def _groups(motion: Motion) -> Iterator[str]:
     source = motion.source
     if source is None or recording(motion) is None:
         return
-    found = parameters_of(source.format, source.template, source.detail).found
-    groups = [group for group in dict.fromkeys(group for group, _ in found) if group not in GROUPS]
+    parameters = parameters_of(source.format, source.template, source.detail).found
+    groups = [
+        group for group in dict.fromkeys(group for group, _ in parameters) if group not in GROUPS
+    ]
     if groups:
         more = " ..." if len(groups) > MOST_NAMES else ""
         yield f"left out: parameters of {', '.join(groups[:MOST_NAMES])}{more}"
@@ -133,9 +135,9 @@ COUNTING = ("bvh", "amc", "c3d")
 
 
 def with_counted_times(motion: Motion, to: str) -> Motion:
-    """``motion`` as a file that counts frames can have it: without a signal of times.
+    """``motion`` for a file that counts frames: without a signal of times.
 
-    The first frame of a C3D has the number that gives its time.
+    The first frame of a C3D has the number that implies its time.
     """
     if to == "c3d":
         first = first_number(motion)
@@ -148,20 +150,20 @@ def with_counted_times(motion: Motion, to: str) -> Motion:
 
 
 def first_number(motion: Motion) -> int:
-    """The number of the first frame in a C3D, where frame 1 is at 0 s; else that of the motion."""
+    """The number of the first frame in a C3D, if frame 1 is at 0 s; else the motion's."""
     numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
     line, rate = motion.timeline, motion.frame_rate
     own = int(numbers[0]) if len(numbers) else 0
     if line is None or rate is None or not len(line.times):
         return own
-    first = float(line.even[0]) * float(rate) + 1
-    if abs(first - own) / float(rate) <= line.rounding / 2 + EXACT or not 0 <= first < 2**32:
+    first = float(line.regular_times[0]) * float(rate) + 1
+    if abs(first - own) / float(rate) <= line.rounding / 2 + TOLERANCE or not 0 <= first < 2**32:
         return own
     return round(first)
 
 
 def lost_times(motion: Motion, to: str) -> Iterator[str]:
-    """Times that such a file cannot state, in words: their begin, and gaps."""
+    """Times that such a file cannot state, in words: their begin, and breaks."""
     line, rate, name = motion.timeline, motion.frame_rate, to.upper()
     if line is None or not len(line.times):
         return
@@ -175,8 +177,8 @@ def lost_times(motion: Motion, to: str) -> Iterator[str]:
         frames, step = numbers.astype(np.float64) - 1, motion.number_step
     elif to == "c3d":
         frames += first_number(motion) - 1
-    stated, times = frames / float(rate * step), line.even
-    allowed = line.rounding + EXACT
+    stated, times = frames / float(rate * step), line.regular_times
+    allowed = line.rounding + TOLERANCE
     if abs(times[0] - stated[0]) > allowed:
         first = f"{times[0]:.6g} s: {name} begins at {stated[0]:.6g} s"
         yield f"left out: the time of the first frame, {first}"

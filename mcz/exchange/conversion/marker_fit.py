@@ -24,9 +24,9 @@ FARTHEST = 2.0**100  # length units
 class Fit:
     """Distances of a solution's points from their target positions.
 
-    Distances in length units of the skeleton, over points whose position is known, None where there
-    is none; ``marker_`` ones are of virtual markers. ``frame`` (from 0) and ``point`` are where
-    ``max_error`` is. ``unsolved`` names the channels that no position decides; they are 0.
+    Distances in length units of the skeleton, over points with a known position, None without any;
+    ``marker_`` ones are of virtual markers. ``max_error`` is in ``frame`` (from 0) at ``point``.
+    ``unsolved`` names the channels that no position determines; they are 0.
     """
 
     n_points: int
@@ -63,7 +63,7 @@ class Fit:
 
 
 def _check_sizes(motion: Motion) -> None:
-    """Raises MotionError for a position so far off that its square is beyond binary64."""
+    """Raise MotionError for a position so large that its square is beyond binary64."""
     values = np.asarray(motion.values, np.float64)
     with np.errstate(invalid="ignore"):
         far = np.argwhere(np.abs(values) > FARTHEST)
@@ -86,14 +86,14 @@ class Solved(NamedTuple):
 
 
 def from_positions(motion: Motion, base: Skeleton) -> Solved:
-    """Markers as a motion of the skeleton ``base``, whose points they are, and how well they fit.
+    """Markers as a motion of the skeleton ``base``, whose points they are, and the fit.
 
-    The markers are the points of ``base`` in order, with its virtual markers after them or
-    without. Values are found by inverse kinematics (see ``solve_ik``), on a grid of 6 decimals.
-    Frame rate, frame numbers, name, metadata and further signals are kept.
+    The markers are the points of ``base`` in order, with its virtual markers after them or without.
+    Values are found by inverse kinematics (see ``solve_ik``), on a grid of 6 decimals. Frame rate,
+    frame numbers, name, metadata and further signals are kept.
 
-    Raises MotionError where the markers are not so many, ``motion`` has no markers, or ``base``
-    has no kinematics.
+    Raises MotionError for another number of markers, for a ``motion`` without markers, or a
+    ``base`` without kinematics.
     """
     skeleton, first = motion.skeleton, motion.signals[0]
     if point_set(skeleton) != "markers":
@@ -163,13 +163,12 @@ def _fit(
 
 
 def _distances(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Between points (n_frames, n, 3), NaN where one is not known."""
+    """Distances between points (n_frames, n, 3), NaN where one is unknown."""
     step = a - b
     distances: NDArray[np.float64] = np.sqrt((step * step).sum(axis=2))
     return distances
 
 
 def _figures(distances: NDArray[np.float64]) -> tuple[float | None, float | None]:
-    """Mean and greatest of the distances that are known."""
     known = distances[~np.isnan(distances)]
     return (float(known.mean()), float(known.max())) if len(known) else (None, None)

@@ -100,7 +100,7 @@ class Blocks:
                 clip = self.sources.clip(member)
                 text += b"".join(clip.value_hashes) + clip.skeleton_id
                 if not member.is_even:
-                    text += np.diff(timeline_of_member(clip, member).even).tobytes()
+                    text += np.diff(timeline_of_member(clip, member).regular_times).tobytes()
             else:
                 text += repr((member.target, member.clip)).encode()
             key = self._keys[member] = hashlib.sha256(text).hexdigest()[:32]

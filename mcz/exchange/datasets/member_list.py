@@ -161,8 +161,8 @@ def _members(
         member = Member(target, clip.name, n_frames, own, n_frames, start)
         part = timeline.cut(slice(start, stop)) if timeline is not None and n_frames else None
         if part is not None and timeline is not None:
-            is_even = part.places is not None and bool((np.diff(part.places) == 1).all())
-            time = float(timeline.even[start])
+            is_even = part.ticks is not None and bool((np.diff(part.ticks) == 1).all())
+            time = float(timeline.regular_times[start])
             member = replace(member, time=time, is_even=is_even)
         if recipe.rate is not None:
             member = replace(member, n_frames=_resampled_frames(member, part, recipe.rate))

@@ -150,7 +150,7 @@ class Sources:
         if rate is not None:
             return member.time + frame / float(rate)
         with self._turns:
-            return float(timeline_of_member(self.clip(member), member).even[frame])
+            return float(timeline_of_member(self.clip(member), member).regular_times[frame])
 
     def features(self, recipe: Recipe, member: Member, start: int, stop: int) -> Arrays:
         """The arrays of frames start <= f < stop, as the data set counts them."""

@@ -17,9 +17,9 @@ from mcz.errors import AccessError, OptionError, reason_of
 PAYLOAD = "data"
 DECLARATION = "bagit.txt"
 INFO = "bag-info.txt"
-ALGORITHMS = ("sha256", "sha512")  # that every tool knows: section 2.4
+ALGORITHMS = ("sha256", "sha512")  # known to every tool: section 2.4
 BLOCK = 1024 * 1024  # bytes that are hashed at a time
-_LINES = re.compile(r"\r\n|\r|\n")  # names may hold what else ends a line elsewhere
+_LINES = re.compile(r"\r\n|\r|\n")  # names may contain other line ends
 _LINE = re.compile(r"([0-9A-Fa-f]+)[ \t]+\*?(\S.*)")
 _TAG = re.compile(r"([^\s:][^:]*?)\s*:\s*(.*)")
 _ESCAPES = {"%": "%25", "\n": "%0A", "\r": "%0D"}
@@ -32,9 +32,9 @@ def digests(path: Path, algorithms: Iterable[str] = ALGORITHMS) -> dict[str, str
     hashes = {name: hashlib.new(name) for name in algorithms}
     with path.open("rb") as stream:
         while block := stream.read(BLOCK):
-            for found in hashes.values():
-                found.update(block)
-    return {name: found.hexdigest() for name, found in hashes.items()}
+            for digest in hashes.values():
+                digest.update(block)
+    return {name: digest.hexdigest() for name, digest in hashes.items()}
 
 
 def manifest_text(digest_of: Mapping[str, str]) -> str:
@@ -43,14 +43,14 @@ def manifest_text(digest_of: Mapping[str, str]) -> str:
 
 
 def read_manifest(text: str) -> Iterator[tuple[str, str]]:
-    """Path and digest of each line; raises OptionError for a line that is none."""
+    """Path and digest of each line; raises OptionError for a bad line."""
     for number, line in enumerate(_LINES.split(text), 1):
         if not line.strip():
             continue
-        found = _LINE.fullmatch(line)
-        if found is None:
-            raise OptionError(f"line {number} is no digest and path: {line[:80]!r}")
-        yield _unescaped(found[2]), found[1].lower()
+        match = _LINE.fullmatch(line)
+        if match is None:
+            raise OptionError(f"line {number} is not a digest and a path: {line[:80]!r}")
+        yield _unescaped(match[2]), match[1].lower()
 
 
 def is_inside(path: str) -> bool:
@@ -61,11 +61,11 @@ def is_inside(path: str) -> bool:
 
 
 def tags_text(pairs: Pairs) -> str:
-    """``bag-info.txt`` and the like; raises OptionError for what cannot be one of its lines."""
+    """``bag-info.txt`` and the like; raises OptionError for a bad line."""
     lines = []
     for name, value in pairs:
         if not name.strip() or name != name.strip() or re.search(r"[:\r\n]", name):
-            raise OptionError(f"{name!r} is no name of a line of {INFO}")
+            raise OptionError(f"{name!r} is not a valid name in {INFO}")
         if re.search(r"[\r\n]", value) or value != value.strip():
             raise OptionError(f"{INFO}: {name}: {value!r} is not one line of text")
         lines.append(f"{name}: {value}\n")
@@ -73,7 +73,7 @@ def tags_text(pairs: Pairs) -> str:
 
 
 def read_tags(text: str) -> list[tuple[str, str]]:
-    """Names and values, lines that are folded put together; raises OptionError."""
+    """Names and values, with folded lines joined; raises OptionError."""
     pairs: list[tuple[str, str]] = []
     for number, line in enumerate(_LINES.split(text), 1):
         if not line.strip():
@@ -81,19 +81,19 @@ def read_tags(text: str) -> list[tuple[str, str]]:
         if line[0] in " \t" and pairs:
             pairs[-1] = pairs[-1][0], f"{pairs[-1][1]} {line.strip()}"
             continue
-        found = _TAG.fullmatch(line.rstrip())
-        if found is None:
-            raise OptionError(f"line {number} is no name and value: {line[:80]!r}")
-        pairs.append((found[1], found[2]))
+        match = _TAG.fullmatch(line.rstrip())
+        if match is None:
+            raise OptionError(f"line {number} is not a name and a value: {line[:80]!r}")
+        pairs.append((match[1], match[2]))
     return pairs
 
 
 def _escaped(path: str) -> str:
-    return re.sub(r"[%\r\n]", lambda found: _ESCAPES[found[0]], path)
+    return re.sub(r"[%\r\n]", lambda match: _ESCAPES[match[0]], path)
 
 
 def _unescaped(path: str) -> str:
-    return re.sub(r"%(0[AaDd]|25)", lambda found: chr(int(found[1], 16)), path)
+    return re.sub(r"%(0[AaDd]|25)", lambda match: chr(int(match[1], 16)), path)
 
 
 VERSIONS = ("0.93", "0.94", "0.95", "0.96", "0.97", "1.0")
@@ -103,7 +103,7 @@ _MANIFEST = re.compile(r"(tag)?manifest-([a-z0-9]+)\.txt")
 
 @dataclass(slots=True)
 class BagCheck:
-    """Result of a validation: ``problems``, of which a valid bag has none.
+    """Result of a validation: ``problems``, empty for a valid bag.
 
     ``files``: the paths of the payload, of ``n_bytes``. ``info``: the lines of bag-info.txt.
     ``algorithms``: those of the payload's manifests.
@@ -125,37 +125,37 @@ def is_bag(folder: str | os.PathLike[str]) -> bool:
 def check_bag(
     folder: str | os.PathLike[str], progress: Callable[[int, int, str], object] | None = None
 ) -> BagCheck:
-    """Compare each file of a bag with each manifest; what is missing, too many or changed.
+    """Compare each file of a bag with each manifest; lists missing, extra and changed files.
 
-    Raises OptionError where the folder is no bag, AccessError where a file cannot be read.
+    Raises OptionError where the folder is not a bag, AccessError where a file cannot be read.
     """
-    found = BagCheck(Path(folder))
+    check = BagCheck(Path(folder))
     if not is_bag(folder):
-        raise OptionError(f"it is no bag: it has no {DECLARATION}", path=folder)
+        raise OptionError(f"it is not a bag: it has no {DECLARATION}", path=folder)
     try:
-        _BagValidator(found, progress).run()
+        _BagValidator(check, progress).run()
     except OSError as error:
         raise AccessError(reason_of(error), path=error.filename or folder) from None
-    return found
+    return check
 
 
 class _BagValidator:
-    def __init__(self, found: BagCheck, progress: Callable[[int, int, str], object] | None) -> None:
-        self.found, self.progress = found, progress
+    def __init__(self, check: BagCheck, progress: Callable[[int, int, str], object] | None) -> None:
+        self.found, self.progress = check, progress
         self.encoding = "utf-8"
 
     def run(self) -> None:
-        found = self.found
+        check = self.found
         self._read_declaration()
-        found.files = sorted(self._list_files(PAYLOAD))
+        check.files = sorted(self._list_files(PAYLOAD))
         payload, tags = self._read_manifests()
-        found.algorithms = sorted(payload)
+        check.algorithms = sorted(payload)
         if not payload:
             self._fault("no manifest-ALGORITHM.txt of an algorithm that is known")
         self._check_listing(payload)
         self._compare(payload, tags)
         self._check_oxum()
-        if (found.folder / "fetch.txt").is_file():
+        if (check.folder / "fetch.txt").is_file():
             self._fault("fetch.txt: the bag has files elsewhere; fetch them first")
 
     def _fault(self, text: str) -> None:
@@ -181,17 +181,16 @@ class _BagValidator:
         self.found.version = tags.get("BagIt-Version", "")
         if self.found.version not in VERSIONS:
             self._fault(f"{DECLARATION}: BagIt-Version {self.found.version!r} is not known")
-        said = tags.get("Tag-File-Character-Encoding", "")
+        encoding = tags.get("Tag-File-Character-Encoding", "")
         try:
-            "".encode(said or "none")
-            self.encoding = said.lower()
+            "".encode(encoding or "none")
+            self.encoding = encoding.lower()
         except LookupError:
-            self._fault(f"{DECLARATION}: Tag-File-Character-Encoding {said!r} is not known")
+            self._fault(f"{DECLARATION}: Tag-File-Character-Encoding {encoding!r} is not known")
         if (self.found.folder / INFO).is_file():
             self.found.info = self._tags(INFO)
 
     def _list_files(self, name: str) -> Iterable[str]:
-        """The paths of all files below a folder of the bag."""
         root = self.found.folder
         if not (root / name).is_dir():
             self._fault(f"no folder {name}")
@@ -227,7 +226,7 @@ class _BagValidator:
         return rows
 
     def _check_listing(self, payload: dict[str, dict[str, str]]) -> None:
-        """Every file must be in every manifest, before version 1.0 in one of them."""
+        """Check that every file is in every manifest, before version 1.0 in one of them."""
         everywhere = self.found.version == "1.0"
         for path in self.found.files:
             absent = [name for name, rows in payload.items() if path not in rows]
@@ -252,9 +251,9 @@ class _BagValidator:
                     self._fault(f"{path}: its {algorithm} is {digest}, not {digest_of[algorithm]}")
 
     def _check_oxum(self) -> None:
-        found = self.found
-        found.n_bytes = sum((found.folder / path).stat().st_size for path in found.files)
-        counted = f"{found.n_bytes}.{len(found.files)}"
-        for name, value in found.info:
+        check = self.found
+        check.n_bytes = sum((check.folder / path).stat().st_size for path in check.files)
+        counted = f"{check.n_bytes}.{len(check.files)}"
+        for name, value in check.info:
             if name.lower() == "payload-oxum" and value != counted:
                 self._fault(f"{INFO}: Payload-Oxum is {value}, there is {counted}")

@@ -34,14 +34,13 @@ def bag(
     *,
     software: str = "mcz",
 ) -> Path:
-    """Make ``folder``, which must not exist, a bag that holds copies of ``files``; return it.
+    """Make ``folder``, which must not exist, a bag with copies of ``files``; return it.
 
     ``info``: lines of ``bag-info.txt``, such as {"Source-Organization": "..."}; Bagging-Date is
-    today unless it is among them, Bag-Software-Agent is ``software``. Every ``.mcz`` is checked
-    quickly first. The folder gets its name when all is in it.
-    Raises FormatError for a damaged ``.mcz``, ExistsError where ``folder`` exists, OptionError for
-    two files of one name and a name with % or a line end, AccessError where a file cannot be read
-    or written.
+    today unless given, Bag-Software-Agent is ``software``. Every ``.mcz`` is checked quickly first.
+    The folder gets its name when it is complete. Raises FormatError for a damaged ``.mcz``,
+    ExistsError where ``folder`` exists, OptionError for two files of one name and a name with % or
+    a line end, AccessError where a file cannot be read or written.
     """
     target, paths = Path(folder), [Path(file) for file in files]
     lines = _info_lines(dict(info or {}), software)
@@ -82,7 +81,6 @@ def _info_lines(info: dict[str, str], software: str) -> list[tuple[str, str]]:
 
 
 def _check_files(paths: Sequence[Path]) -> None:
-    """Raise for what cannot be in one bag, or is damaged."""
     if not paths:
         raise OptionError("a bag of no files")
     names: dict[str, Path] = {}
@@ -90,7 +88,7 @@ def _check_files(paths: Sequence[Path]) -> None:
         other = names.setdefault(path.name.casefold(), path)
         if other is not path:
             raise OptionError(f"{other} and {path} would have one name in the bag")
-        if set(path.name) & set("%\r\n"):  # RFC 8493 escapes them, not every tool knows
+        if set(path.name) & set("%\r\n"):  # RFC 8493 escapes them, but some tools do not
             raise OptionError("tools for bags differ on names with %; rename it", path=path)
         if not path.is_file():
             raise AccessError(f"{'not a file' if path.exists() else 'no such file'}", path=path)
@@ -107,20 +105,20 @@ def _check_files(paths: Sequence[Path]) -> None:
 def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> None:
     data = folder / PAYLOAD
     data.mkdir()
-    found: dict[str, dict[str, str]] = {name: {} for name in ALGORITHMS}
+    by_algorithm: dict[str, dict[str, str]] = {name: {} for name in ALGORITHMS}
     size = 0
     for path in sorted(paths, key=lambda path: path.name):
         copy = data / path.name
         shutil.copyfile(path, copy)
         _sync(copy)
         size += copy.stat().st_size
-        if _add_digests(found, f"{PAYLOAD}/{path.name}", copy) != digests(path):
+        if _add_digests(by_algorithm, f"{PAYLOAD}/{path.name}", copy) != digests(path):
             raise AccessError("it changed while it was copied", path=path)
     tags = {
         DECLARATION: "BagIt-Version: 1.0\nTag-File-Character-Encoding: UTF-8\n",
         INFO: tags_text([*lines, (OXUM, f"{size}.{len(paths)}")]),
     }
-    tags |= {f"manifest-{name}.txt": manifest_text(rows) for name, rows in found.items()}
+    tags |= {f"manifest-{name}.txt": manifest_text(rows) for name, rows in by_algorithm.items()}
     stated: dict[str, dict[str, str]] = {name: {} for name in ALGORITHMS}
     for name, text in tags.items():
         _write(folder / name, text)
@@ -129,10 +127,10 @@ def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> 
         _write(folder / f"tagmanifest-{name}.txt", manifest_text(rows))
 
 
-def _add_digests(found: dict[str, dict[str, str]], name: str, path: Path) -> dict[str, str]:
+def _add_digests(by_algorithm: dict[str, dict[str, str]], name: str, path: Path) -> dict[str, str]:
     digest_of = digests(path)
     for algorithm, digest in digest_of.items():
-        found[algorithm][name] = digest
+        by_algorithm[algorithm][name] = digest
     return digest_of
 
 

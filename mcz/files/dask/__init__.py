@@ -1,8 +1,7 @@
 """Archives packed, verified and read by the machines of a Dask cluster (the extra ``mcz[dask]``).
 
-The processes of ``mcz.files.jobs`` are one engine, a cluster is another: both do the same work,
-and its results are joined in the same order. A lost machine costs time and nothing else: Dask does
-its work again.
+The processes of ``mcz.files.jobs`` are one engine, a cluster is another: both do the same work, and
+their results are joined in the same order. A lost machine costs only time: Dask repeats its work.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def verify(
     max_decoded: int | None = None,
     where: Where | None = None,
 ) -> list[Problem]:
-    """Check an MCZ file as ``mcz.verify`` does, its clips on the workers of ``client``.
+    """Check an MCZ file as ``mcz.verify``, its clips on the workers of ``client``.
 
     ``target`` is a path or URL that all of them can read; ``client`` is as in ``pack``. Raises as
     ``mcz.verify``, and WorkerError where machines are lost.
@@ -54,8 +53,8 @@ def map_clips(
 ) -> list[Result]:
     """``function`` of every clip of an MCZ file, on the workers; results in the order of the clips.
 
-    ``where``: of those that it takes, see ``File.find``. The rest is as in ``verify``. An error
-    that ``function`` raises is raised here.
+    ``where`` selects clips, see ``File.find``. The rest is as in ``verify``. An error raised by
+    ``function`` is raised here.
     """
     with open(target, max_decoded=max_decoded) as file, connect(client) as used:
         if not can_be_shared(file):

@@ -13,20 +13,20 @@ from uuid import uuid4
 from mcz.errors import MczError, OptionError, WorkerError
 from mcz.files.jobs import Answer, Item, Result
 from mcz.model.extras import import_extra
-from mcz.model.threads import limited
+from mcz.model.threads import limit_threads
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-AHEAD = 3  # tasks for each thread of the cluster: what waits there and here is bounded
+AHEAD = 3  # tasks for each thread of the cluster: a bounded queue there and here
 TRIES = 3  # of a task that the machines were lost with
-RETRIES = 2  # of a task whose worker failed in another way than by ending
+RETRIES = 2  # of a task whose worker failed but did not end
 
 
 class Cluster:
     """The workers of a ``distributed.Client``.
 
-    Each task has a key of its own, so that one that is done again gives one answer all the same.
+    Each task has a key of its own, so that a repeated one gives one answer.
     """
 
     def __init__(self, client: Client) -> None:
@@ -34,7 +34,7 @@ class Cluster:
 
     @property
     def jobs(self) -> int:
-        """Number of tasks at once; raises WorkerError for a cluster without workers."""
+        """Number of parallel tasks; raises WorkerError for a cluster without workers."""
         n_threads = sum(self._client.nthreads().values())
         if not n_threads:
             raise WorkerError("the cluster has no worker", path=self._client.scheduler.address)
@@ -111,7 +111,7 @@ def run_task(packed: bytes, item: object) -> tuple[bool, object]:
     """Call on a worker: True and the result, or False and the MczError."""
     function, state = _unpack(packed)
     try:
-        with limited(1):  # the cluster knows how many tasks a machine takes
+        with limit_threads(1):  # the cluster decides how many tasks a machine runs
             return True, function(state, item)
     except MczError as error:
         return False, error
@@ -119,7 +119,7 @@ def run_task(packed: bytes, item: object) -> tuple[bool, object]:
 
 @lru_cache(maxsize=4)
 def _unpack(packed: bytes) -> Any:
-    """Function and state, an open file among it: kept for the next task."""
+    """Function and state, perhaps with an open file: kept for the next task."""
     return pickle.loads(packed)
 
 
@@ -127,7 +127,7 @@ def _unpack(packed: bytes) -> Any:
 def connect(client: Client | str | None) -> Iterator[Client]:
     """The client itself, or one of the scheduler at an address ("tcp://host:8786").
 
-    None: the client that the process has. Raises OptionError where there is none, or no Dask.
+    None: the client of the process. Raises OptionError if there is none, or no Dask.
     """
     dask = import_extra("distributed", "dask", package="Dask")
     try:
@@ -135,9 +135,9 @@ def connect(client: Client | str | None) -> Iterator[Client]:
             with dask.Client(client) as made:
                 yield made
             return
-        found = dask.default_client() if client is None else client
+        chosen_client = dask.default_client() if client is None else client
     except ValueError as error:
         raise OptionError(f"no Dask client: {error}") from None
     except OSError as error:
         raise OptionError(f"no scheduler answers: {error}", path=client) from None
-    yield found
+    yield chosen_client

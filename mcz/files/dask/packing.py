@@ -51,17 +51,17 @@ def pack(
     copies: bool = True,
     progress: Progress | None = None,
 ) -> Report:
-    """Pack every motion file below ``root`` into one MCZ file, as ``mcz.pack`` does.
+    """Pack every motion file below ``root`` into one MCZ file, as ``mcz.pack``.
 
-    ``root`` and ``target`` are paths or URLs that fsspec knows ("s3://bucket/takes"); all machines
-    can read ``root``, only this one writes ``target``. ``client`` is a ``distributed.Client``, the
-    address of a scheduler, or None for the client that there is. The bytes are those of
+    ``root`` and ``target`` are paths or URLs for fsspec ("s3://bucket/takes"); all machines can
+    read ``root``, only this one writes ``target``. ``client`` is a ``distributed.Client``, the
+    address of a scheduler, or None for the client of the process. The bytes equal those of
     ``mcz.pack``. Raises OptionError, and WorkerError where the cluster has no workers; a file whose
-    machines are lost again and again is reported as failed.
+    machines are lost repeatedly is reported as failed.
     """
     root = os.fspath(root)
-    found, others = list_files(root, target)
-    taken, left = _chosen(found, keep_all)
+    files, others = list_files(root, target)
+    taken, left = _chosen(files, keep_all)
     options = SourceOptions(
         rate=rate,
         force_rate=force_rate,
@@ -76,7 +76,7 @@ def pack(
     paths = [os.path.join(root, one.name) for one in taken] if "://" not in root else []  # noqa: PTH118
     inputs = (*paths, *encoding.params.values())
     report, writing = Report(), WritingOptions(force, profile_named(profile), copies)
-    skeletons = [one.name for one in found if one.name.lower().endswith(".asf")]
+    skeletons = [one.name for one in files if one.name.lower().endswith(".asf")]
     entries = [SourceEncoder(Path(root, one.name), one.name, options, encoding) for one in taken]
     asks = (
         RemoteFile(
@@ -87,27 +87,26 @@ def pack(
     with connect(client) as used, replacing(target, force=force, inputs=inputs) as stream:
         transaction = WriteTransaction(stream, writing.profile, copies=writing.copies)
         with closing(Cluster(used).in_order(encode_remotely, asks, None)) as answers:
-            given = cast(Iterator[Answer[Part]], answers)  # none is None
+            given = cast(Iterator[Answer[Part]], answers)  # no item is None
             made = zip(entries, given, taken, strict=True)
             parts = (RemotePart(entry, answer, one.size) for entry, answer, one in made)
             write_in_turn(transaction, parts, len(taken), report, progress, {})
         transaction.finish()
     report.size = transaction.writer.offset
-    report.note(notes_on(one.name for one in taken))
+    report.add_messages(notes_on(one.name for one in taken))
     report.outcomes += sorted([*others, *left], key=lambda one: os.fsencode(one.path))
     return report
 
 
-def _chosen(found: Sequence[Found], keep_all: bool) -> tuple[list[Found], list[Outcome]]:
-    """The files that are packed, and what becomes of the others."""
-    motions, _ = motion_files([Path(one.name) for one in found])
+def _chosen(files: Sequence[Entry], keep_all: bool) -> tuple[list[Entry], list[Outcome]]:
+    motions, _ = motion_files([Path(one.name) for one in files])
     known = {path.as_posix() for path in motions}
-    left = [Outcome(o.name, "skipped", o.size, NO_MOTION) for o in found if o.name not in known]
-    return (list(found), []) if keep_all else ([o for o in found if o.name in known], left)
+    left = [Outcome(o.name, "skipped", o.size, NO_MOTION) for o in files if o.name not in known]
+    return (list(files), []) if keep_all else ([o for o in files if o.name in known], left)
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Entry:
     """A file below the root: its relative path, and its size in bytes."""
 
     name: str
@@ -116,7 +115,7 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class RemoteFile:
-    """A file below ``root`` that is to be coded; ``beside``: names of the ASFs that it may need."""
+    """A file below ``root`` to encode; ``beside``: names of the ASFs that it may need."""
 
     root: str
     ask: PartRequest
@@ -127,32 +126,32 @@ def is_url(root: str) -> bool:
     return "://" in root
 
 
-def list_files(root: str, target: Target) -> tuple[list[Found], list[Outcome]]:
-    """The files below ``root`` but for an earlier ``target``, in the order of an archive.
+def list_files(root: str, target: Target) -> tuple[list[Entry], list[Outcome]]:
+    """The files below ``root`` except an earlier ``target``, in the order of an archive.
 
-    Raises OptionError where it is no folder, AccessError where it cannot be listed.
+    Raises OptionError where it is not a folder, AccessError where it cannot be listed.
     """
     if not is_url(root):
         folder = Path(root)
         if not folder.is_dir():
             raise OptionError("not a folder", path=root)
         paths, others = files_below(folder, target)
-        found = [Found(path.relative_to(folder).as_posix(), size_of(path)) for path in paths]
-        return found, others
+        files = [Entry(path.relative_to(folder).as_posix(), size_of(path)) for path in paths]
+        return files, others
     fs, base = _opened(root)
     own = _opened(str(target))[1] if is_url(str(target)) else None
     try:
         details = fs.find(base, detail=True)
     except Exception as error:  # each kind of store has errors of its own
         raise AccessError(str(error), path=root) from None
-    found = [
-        Found(posixpath.relpath(path, base), int(entry["size"] or 0))
+    files = [
+        Entry(posixpath.relpath(path, base), int(entry["size"] or 0))
         for path, entry in details.items()
         if entry["type"] == "file" and path != own and not path.endswith("/")
     ]
-    if not found:
+    if not files:
         raise OptionError("no file is below it", path=root)
-    return sorted(found, key=lambda one: os.fsencode(one.name)), []
+    return sorted(files, key=lambda one: os.fsencode(one.name)), []
 
 
 def _opened(url: str) -> tuple[Any, str]:
@@ -176,12 +175,12 @@ def skeletons_beside(name: str, skeletons: list[str]) -> tuple[str, ...]:
 
 
 def encode_remotely(state: object, ask: RemoteFile) -> Part:
-    """The part of a file, made by whoever can read it; raises as ``coded`` does."""
+    """The part of a file, made by a machine that can read it; raises as ``encode_part``."""
     with ExitStack() as stack:
         root = ask.root
         if is_url(root):
             own = stack.enter_context(TemporaryDirectory(prefix="mcz-"))
-            root = str(Path(own, "root"))  # around it there is nothing that may be taken for an ASF
+            root = str(Path(own, "root"))  # the folder around it has no ASF
             _fetch(ask, Path(root))
         try:
             part = encode_part(state, replace(ask.ask, path=Path(root, ask.ask.name)))
@@ -199,7 +198,7 @@ def encode_remotely(state: object, ask: RemoteFile) -> Part:
 
 
 def _named(text: str, copy: str, root: str) -> str:
-    """``text`` about a copy, said of the file itself."""
+    """``text`` about a copy, with the name of the file itself."""
     if isinstance(text, Remark):
         return Remark(_named(text.words, copy, root), text.hint)
     return text.replace(copy, root.rstrip("/"))

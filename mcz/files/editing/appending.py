@@ -1,6 +1,6 @@
-"""Growing a file in place: one process at a time, and never at the cost of what it held.
+"""Growing a file in place: one process at a time, without risk to its contents.
 
-SPEC.md, "FOOT", says what follows the FOOT of a file that grew.
+SPEC.md, "FOOT", defines the bytes after the FOOT of a file that grew.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from mcz.errors import (
 )
 from mcz.model.schema import parse
 
-IN_MEMORY = 1 << 26  # bytes of an addition; of a longer one a file beside the target holds them
+IN_MEMORY = 1 << 26  # bytes of an addition; a longer one is kept in a file next to the target
 BLOCK = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """Names of whole things behind the last FOOT of a file whose writing was cut short.
+    """Names of intact things after the last FOOT of a truncated file.
 
-    ``kept`` is True where the file goes on behind them, False where it goes on in their place.
+    ``kept`` is True if the file continues after them, False if it replaces them.
     """
 
     names: tuple[str, ...] = ()
@@ -47,7 +47,7 @@ class Tail:
 
 @dataclass(frozen=True, slots=True)
 class Growth:
-    """A file that is about to grow: what is written to ``added`` will follow ``container``."""
+    """A file that is about to grow: bytes written to ``added`` will follow ``container``."""
 
     container: Container
     added: BinaryIO
@@ -56,13 +56,13 @@ class Growth:
 
 @contextmanager
 def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
-    """Append what the block writes behind the last valid FOOT, over anything cut short there.
+    """Append the output of the block after the last valid FOOT, over any truncated part.
 
-    Where whole clips, skeletons or attachments lie behind that FOOT, ``salvage`` keeps them and
-    ``force`` gives them up; otherwise that is a FormatError that names them. Where the end of the
-    file is damaged rather than cut off, one of the two has to be given. If the block fails,
-    the file is not touched; if writing fails, it ends where it ended before, or at that FOOT.
-    Raises AccessError where another process is appending to the file.
+    Where intact clips, skeletons or attachments follow that FOOT, ``salvage`` keeps them and
+    ``force`` drops them; otherwise a FormatError names them. If the end of the file is damaged, not
+    just truncated, one of the two is required. If the block fails, the file is unchanged; if
+    writing fails, it ends at its old end, or at that FOOT. Raises AccessError where another process
+    is appending to the file.
     """
     try:
         stream = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
@@ -89,7 +89,7 @@ def _check_not_replaced(stream: BinaryIO, path: Path) -> None:
 
 
 def _write_at(stream: BinaryIO, end: int, added: BinaryIO) -> None:
-    """Write what was ``added`` at ``end``; where that fails the file ends there, as it was."""
+    """Write ``added`` at ``end``; if that fails the file is restored to that end."""
     try:
         stream.seek(end)
         added.seek(0)
@@ -106,7 +106,7 @@ def _write_at(stream: BinaryIO, end: int, added: BinaryIO) -> None:
 
 
 def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tuple[Container, Tail]:
-    """The file as far as it will stay, and the rest of it."""
+    """The part of the file that stays, and the rest of it."""
 
     def up_to(end: int, salvage: bool = False) -> Container:
         return Container(ByteSource(stream, name=str(path), size=end), salvage=salvage)
@@ -119,7 +119,7 @@ def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tup
     if isinstance(reason, TruncatedError):
         foot = reason.last_foot
     elif isinstance(reason, UnsupportedError | LimitError) or not (salvage or force):
-        raise reason  # its end is damaged, not only cut off: to go on from before must be asked for
+        raise reason  # its end is damaged, not just truncated: continuing from before needs consent
     else:
         feet = scan(ByteSource(stream), salvage=True).feet
         foot = feet[-1] + FOOT.size if feet else None
@@ -132,7 +132,7 @@ def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tup
             raise reason
         if names:
             raise FormatError(
-                f"its writing was cut short; behind the last FOOT, which ends at {foot}, these "
+                f"its writing was cut short; after the last FOOT, which ends at {foot}, these "
                 f"are whole: {', '.join(sorted(names))}; salvage keeps them, force drops them"
             )
         return shorter, Tail()
@@ -152,16 +152,16 @@ def _restorable_names(container: Container | None) -> set[str]:
 
 
 def _whole_until(source: ByteSource, start: int) -> int:
-    """End of the last whole thing behind ``start``; nothing counts behind the first fault."""
+    """End of the last intact thing after ``start``, up to the first fault."""
     end = at = start or len(SIGNATURE)
     inside = False
-    found = scan(source, salvage=True)
-    for chunk in found.chunks:
+    scanned = scan(source, salvage=True)
+    for chunk in scanned.chunks:
         if chunk.offset < start:
             continue
         if chunk.offset != at or chunk.type == ChunkType.INDX:
             break  # an INDX belongs to its FOOT
-        at = found.ends[at] if chunk.length is None else at + chunk.size
+        at = scanned.ends[at] if chunk.length is None else at + chunk.size
         inside = chunk.type == ChunkType.CLIP or (inside and chunk.type != ChunkType.CEND)
         if not inside and _is_last_part(source, chunk):
             end = at

@@ -70,13 +70,12 @@ def pack(
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. ``rate`` is that of files that state none, with ``force_rate`` of
-    all. ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``,
-    ``copies`` and ``threads`` are those of ``mcz.write``;
-    ``jobs`` processes may work at once, by default one: the bytes are the same. ``mtimes`` keeps
-    when each file was last changed as metadata of its clip, so that the same files give other
-    bytes later. An earlier MCZ file of the target's name is no part of the new one; any other file
-    that the target would replace is refused, even with ``force``.
+    relative to ``directory``. ``rate`` applies to files that state none, with ``force_rate`` to
+    all. ``arrays`` and ``model`` are as in ``mcz.read``; ``effort``, ``copies`` and ``threads`` as
+    in ``mcz.write``; ``jobs`` processes work in parallel, by default one: the bytes are the same.
+    ``mtimes`` stores the modification time of each file as metadata of its clip, so that the same
+    files give other bytes later. An earlier MCZ file of the target's name is not packed; any other
+    file that the target would replace is refused, even with ``force``.
     """
     root = Path(directory)
     if not root.is_dir():
@@ -109,7 +108,7 @@ def pack(
         transaction.finish()
     report.size = transaction.writer.offset
     report.left_out += dropped_facts(root, paths, with_times=mtimes)
-    report.note(notes_on(entry.name for entry in entries))
+    report.add_messages(notes_on(entry.name for entry in entries))
     report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
 
@@ -154,26 +153,24 @@ def append(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """Add files after the last valid FOOT of an MCZ file; what it held stays readable throughout.
+    """Add files after the last valid FOOT of an MCZ file, which stays readable throughout.
 
-    Each is stored under its path relative to ``root``, or without one under its name alone; of a
-    folder every motion file below it, under its path relative to the folder. A file that the target
-    restores already under the same path is left out as "present", another one under a path that is
-    taken is refused, and one whose content is there under another name is an alias. Of an MCZ file
-    all that it holds is carried over, nothing coded anew; ``rename`` and ``skip_identical`` are
-    those of ``mcz.merge``, ``rate`` and ``force_rate`` of ``mcz.pack``. When a source cannot be
-    added, nothing is. What is added to a file with recovery data gets its own. ``replace``: a file
-    takes the place of another one that came from the same path, for which the whole archive is
-    rewritten; what was said of that one's clip stays.
+    Each is stored under its path relative to ``root``, or without one under its name; of a folder
+    every motion file below it, under its path relative to the folder. A file that the target
+    already restores under the same path is left out as "present", another one under a used path is
+    refused, and one whose content is stored under another name becomes an alias. Of an MCZ file all
+    contents are copied without re-encoding; ``rename`` and ``skip_identical`` are as in
+    ``mcz.merge``, ``rate`` and ``force_rate`` as in ``mcz.pack``. If a source cannot be added, none
+    is. Additions to a file with recovery data get their own. ``replace``: a file replaces an older
+    one from the same path, for which the whole archive is rewritten; the metadata of the old clip
+    are kept.
 
-    A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
-    lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
-    them. Where its end is damaged, one of the two has to be given. ``arrays`` is that of
-    ``mcz.read``. ``threads`` is that of
-    ``mcz.write``, and so is ``copies``, of all that has none yet; None: where the file has some.
-    ``jobs`` is that of ``mcz.pack``.
-    Raises AccessError while another process is appending, OptionError where the target is a source
-    itself.
+    A truncated target is continued from its last valid FOOT. Where intact clips follow that,
+    ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names them. If its end
+    is damaged, one of the two is required. ``arrays`` is as in ``mcz.read``, ``threads`` as in
+    ``mcz.write``, and so is ``copies``, for all chunks without copies; None: if the file has some.
+    ``jobs`` is as in ``mcz.pack``. Raises AccessError while another process is appending,
+    OptionError where the target is also a source.
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     options = SourceOptions(
@@ -188,8 +185,8 @@ def append(
     )
     encoding = encoding_options(codec, effort, params)
     writing = WritingOptions(threads=threads, jobs=jobs)
-    held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
-    files = [source for source in sources if source not in held]
+    archives = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
+    files = [source for source in sources if source not in archives]
     named, others = find_sources(files, root, target)
     entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
     with (
@@ -199,23 +196,23 @@ def append(
     ):
         container = growth.container
         paths, seen = stored_files(container)
-        wanted = bool(container.copies()) if copies is None else copies
+        has_copies = bool(container.copies()) if copies is None else copies
         transaction = WriteTransaction(
             growth.added,
             container.profile,
             container.directory,
             paths,
-            copies=wanted,
-            uncopied=container.uncopied() if wanted else (),
+            copies=has_copies,
+            uncopied=container.uncopied() if has_copies else (),
         )
-        before = File(container) if held else None  # as it is before anything is added
+        before = File(container) if archives else None  # before anything is added
         report = _write_entries(transaction, entries, progress, seen)
         if report.failures:
             words, hints = zip(*(split_hint(o.message) for o in report.failures), strict=True)
             raise SourceError("; ".join(words), hint=hints[0] if len(set(hints)) == 1 else None)
         refuse_inputs(target, _inputs_of(entries))
         if before is not None:
-            added = add_files(held, before, transaction, rename, skip_identical, progress)
+            added = add_files(archives, before, transaction, rename, skip_identical, progress)
             report.outcomes += added.outcomes
             report.left_out += added.left_out
         redundancy = None
@@ -225,7 +222,7 @@ def append(
     if still_protect(target, redundancy):
         report.left_out = [text for text in report.left_out if not text.endswith(UNPROTECTED)]
     report.size = Path(target).stat().st_size
-    report.note(notes_on(transaction.paths, {outcome.path for outcome in report.outcomes}))
+    report.add_messages(notes_on(transaction.paths, {outcome.path for outcome in report.outcomes}))
     report.outcomes += others
     tail = growth.tail
     text = "it lay whole behind the last FOOT of a file whose writing was cut short"
@@ -240,7 +237,7 @@ def _write_entries(
     progress: Progress | None,
     seen: Content | None = None,
 ) -> Report:
-    """Write the files; ``seen``: what the target holds already, by content."""
+    """Write the files; ``seen``: contents of the target by digest."""
     report = Report()
     seen = {} if seen is None else seen
     with encode_ahead(entries, transaction, seen) as in_turn:
@@ -256,7 +253,7 @@ def write_in_turn(
     progress: Progress | None,
     seen: Content,
 ) -> None:
-    """Write one file after the other; ``report`` learns what becomes of each."""
+    """Write one file after the other; ``report`` gets the outcome of each."""
     for done, entry in enumerate(entries):
         size = entry.size if isinstance(entry, RemotePart) else size_of(entry.path)
         try:
@@ -272,9 +269,9 @@ def write_in_turn(
 
 
 def _write_entry(transaction: WriteTransaction, entry: SourceEncoder, seen: Content) -> str:
-    """Write one file, or only its name where the same bytes are there already."""
+    """Write one file, or an alias if the same bytes are stored already."""
     digest = entry.digest()
-    depends = wants_skeleton(entry.path)  # its values hang on the ASF beside it
+    depends = wants_skeleton(entry.path)  # its values depend on the ASF next to it
     writer = transaction.writer
     if digest in seen and not depends and not transaction.holds(entry.name, digest):
         check_name(entry.name)
@@ -293,22 +290,21 @@ def _write_entry(transaction: WriteTransaction, entry: SourceEncoder, seen: Cont
     return result
 
 
-Said = dict[str, dict[str, str]]  # what is said of clips, by the paths of their files
+Said = dict[str, dict[str, str]]  # metadata of clips, by the paths of their files
 Named = Sequence[tuple[Path, str]]  # files, each with its path in the archive
 
 
 @contextmanager
 def superseding(target: Path, named: Named) -> Iterator[Path]:
-    """The path of a file to append ``named`` to: where others came from their paths, of a copy.
+    """The path of a file to append ``named`` to: a copy, if it must replace older contents.
 
-    The copy lacks those, and takes the place of ``target`` when the block ends well. What was said
-    of a clip is said of the one that came in its place. Raises OptionError where a further name
-    has the same content.
+    The copy lacks these, and takes the place of ``target`` when the block succeeds. Metadata of a
+    replaced clip are set for the new one. Raises OptionError where an alias has the same content.
     """
     old: list[str] = []
     if named:
         with open(target) as file:
-            old, said = _find_superseded(file, named)
+            old, metadata = _find_superseded(file, named)
     if not old:
         yield target
         return
@@ -319,7 +315,7 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
         with open(copy) as file:
             by_path = {clip.source.path: clip.name for clip in file.clips.values() if clip.source}
         changes = {
-            by_path[path]: words for path, words in said.items() if words and path in by_path
+            by_path[path]: words for path, words in metadata.items() if words and path in by_path
         }
         if changes:
             set_metadata(copy, changes)
@@ -328,11 +324,11 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
 
 
 def _find_superseded(file: File, named: Named) -> tuple[list[str], Said]:
-    """The things that came from the paths of the files, and their metadata by path."""
+    """The things from the same paths, and their metadata by path."""
     paths, _ = stored_files(file.container)
     clips = {clip.source.path: clip for clip in file.clips.values() if clip.source is not None}
     old: list[str] = []
-    said: Said = {}
+    metadata: Said = {}
     for path, name in named:
         there = paths.get(name)
         if there is None:
@@ -343,9 +339,9 @@ def _find_superseded(file: File, named: Named) -> tuple[list[str], Said]:
         clip = clips.get(name)
         old.append(name if clip is None else clip.name)
         if clip is not None:
-            said[name] = {
+            metadata[name] = {
                 key: value
                 for key, value in clip.metadata.items()
                 if (key in SETTABLE and key != "mtime") or key.startswith("x-")
             }
-    return old, said
+    return old, metadata

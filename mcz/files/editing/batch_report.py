@@ -11,15 +11,22 @@ from mcz.model.text_format import brief
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Outcome for one file, with a reason unless it is plain.
+    """Outcome for one file; ``message`` gives the reason where ``result`` alone does not.
 
-    ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
-    "present" (the target has it already), "restored", or "cut" or "lossy" of a clip that is no
-    longer what its source was, "written", "skipped", "exists" (it may not be replaced) or
-    "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged"; of
-    what is carried over "copied", "renamed", "moved" or "deleted".
-    The ``message`` of one that failed or exists names the file.
-    ``notes`` are remarks of the reader of an added file, and the name of the skeleton it uses.
+    ``result`` of a file that is added to an archive:
+        "parsed", "skeleton", "verbatim", "present" (the target has it already),
+        "alias" (the same bytes are stored under another name)
+    of a restored file:
+        "restored", "written", "cut" or "lossy" (the clip differs from its source)
+    of a thing that is copied from another archive:
+        "copied", "renamed", "moved", "deleted"
+    of a truncated or damaged file:
+        "salvaged", "dropped", "damaged"
+    of a file that is not written:
+        "skipped", "exists" (it may not be replaced), "failed"
+
+    For "failed" and "exists" the message names the file. ``notes`` are remarks of the reader of an
+    added file, and the name of the skeleton that it uses.
     """
 
     path: str
@@ -32,7 +39,7 @@ class Outcome:
 
 
 def failure_outcome(path: str, error: MczError | OSError) -> Outcome:
-    """The outcome of a file that an error has kept from being written."""
+    """The outcome of a file that was not written because of an error."""
     result = "exists" if isinstance(error, ExistsError) else "failed"
     return Outcome(path, result, 0, remark_of(error, path=path))
 
@@ -41,8 +48,8 @@ def failure_outcome(path: str, error: MczError | OSError) -> Outcome:
 class Report:
     """The outcomes of a command over many files.
 
-    ``damage`` is what salvage found wrong, ``size`` that of the MCZ file, once it is written,
-    ``left_out`` what may not be carried over to it from another one.
+    ``damage`` lists faults found by salvage, ``left_out`` parts of the old file that are not
+    copied. ``size`` is the size of the MCZ file, once it is written.
     """
 
     outcomes: list[Outcome] = field(default_factory=list)
@@ -54,13 +61,13 @@ class Report:
 
     @property
     def failures(self) -> list[Outcome]:
-        """The files that failed, those among them that exist and may not be replaced."""
+        """Outcomes "failed" and "exists"."""
         return [outcome for outcome in self.outcomes if outcome.result in ("failed", "exists")]
 
-    def note(self, notes: Mapping[str, str]) -> None:
-        """Add what is to be said of some paths to their outcomes."""
+    def add_messages(self, texts: Mapping[str, str]) -> None:
+        """Append texts to the messages of paths, by path."""
         for index, outcome in enumerate(self.outcomes):
-            if (text := notes.get(outcome.path)) and outcome.result not in ("failed", "skipped"):
+            if (text := texts.get(outcome.path)) and outcome.result not in ("failed", "skipped"):
                 message = f"{outcome.message}; {text}" if outcome.message else text
                 self.outcomes[index] = replace(outcome, message=message)
 

@@ -1,6 +1,6 @@
-"""Chunks of an open file carried over to another one as they are: nothing is coded anew.
+"""Copy chunks of an open file to another one unchanged, without re-encoding.
 
-What is shared is named by its hash, so that it needs no new number and is written once. SPEC.md,
+Shared chunks are named by their hash, so they need no new number and are written once. SPEC.md,
 "Chunks" and "Grammar", are normative.
 """
 
@@ -26,7 +26,7 @@ from mcz.errors import ChecksumError, FormatError
 from mcz.model.schema import build, parse, parse_until
 
 UNPROTECTED = "its recovery data, which are of the old file: mcz protect makes others"
-BLOCK = 1 << 20  # bytes of an open DATA that are copied at once
+BLOCK = 1 << 20  # bytes of an open DATA that are copied at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +42,13 @@ class Change:
     metadata: Mapping[str, str] | None = None
 
 
-SAME = Change()
+UNCHANGED = Change()
 
 
 class ChunkCopier:
-    """Carries chunks of ``container`` over to ``writer``; ``left_out`` says which may not be.
+    """Copies chunks of ``container`` to ``writer``; ``left_out`` lists forbidden ones.
 
-    Every checksum is compared on the way; raises FormatError where one is wrong.
+    Every checksum is checked on the way; raises FormatError for a wrong one.
     """
 
     def __init__(self, container: Container, writer: Writer) -> None:
@@ -66,27 +66,27 @@ class ChunkCopier:
         return payload
 
     def shared(self, kind: bytes, id_: bytes) -> None:
-        """Carry a MODL or SRCE over, unless it is there."""
+        """Copy a MODL or SRCE, unless it is there."""
         if (kind, id_) not in self.writer.directory.shared:
             self.writer.shared(kind, self.stored(kind, id_))
 
     def skeleton(self, id_: bytes) -> bytes:
-        """Carry a SKEL over after its bases and their templates, unless it is there; its id."""
+        """Copy a SKEL after its bases and their templates, unless it is there; return its id."""
         chain: list[bytes] = []
-        wanted: bytes | None = id_
-        while wanted and (ChunkType.SKEL, wanted) not in self.writer.directory.shared:
-            payload = self.stored(ChunkType.SKEL, wanted)
+        next_id: bytes | None = id_
+        while next_id and (ChunkType.SKEL, next_id) not in self.writer.directory.shared:
+            payload = self.stored(ChunkType.SKEL, next_id)
             fields = parse_skel(payload, "SKEL", self.container.profile)
             if fields.source is not None:
                 self.shared(ChunkType.SRCE, fields.source.template)
             chain.append(payload)
-            wanted = fields.base
+            next_id = fields.base
         for payload in reversed(chain):
             self.writer.shared(ChunkType.SKEL, payload)
         return id_
 
     def attachment(self, name: str, as_name: str | None = None) -> None:
-        """Carry an attached file over, perhaps under another name."""
+        """Copy an attached file, perhaps under another name."""
         row = self.container.directory.attachments[name]
         parts = [self.container.payload(part) for part in row.parts]
         if as_name not in (None, name):
@@ -94,7 +94,7 @@ class ChunkCopier:
         self.writer.attachment_parts(as_name or name, row.size, parts)
 
     def before_clips(self) -> None:
-        """Carry over the ancillary chunks before the first clip, to which they do not belong."""
+        """Copy the ancillary chunks before the first clip, which do not belong to it."""
         clips = self.container.directory.clips.values()
         first = min((row.clip.offset for row in clips), default=0)
         for chunk, _ in chunks(self.container.source):
@@ -104,9 +104,9 @@ class ChunkCopier:
                 self.ancillary(chunk)
 
     def ancillary(self, chunk: Chunk) -> bool:
-        """Carry an ancillary chunk over where that is safe; return whether it was.
+        """Copy an ancillary chunk if that is safe; return whether it was.
 
-        META is not: it may speak of other clips, see ``metadata_records``.
+        META is not copied: it may refer to other clips, see ``metadata_records``.
         """
         if chunk.type == ChunkType.META:
             return False
@@ -114,23 +114,23 @@ class ChunkCopier:
             self.writer.ancillary(chunk.type, self.container.payload(chunk))
             return True
         if chunk.type == ChunkType.RECV:
-            if UNPROTECTED not in self.left_out:  # there is one more for each part that was added
+            if UNPROTECTED not in self.left_out:  # each added part has another one
                 self.left_out.append(UNPROTECTED)
-        elif chunk.type != ChunkType.COPY:  # those are made anew where they are wanted
+        elif chunk.type != ChunkType.COPY:  # copies are written again if requested
             self.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
         return False
 
-    def clip(self, name: str, change: Change = SAME) -> None:
-        """Carry a clip over: its skeleton and template, CLIP to CEND, and what belongs to it."""
+    def clip(self, name: str, change: Change = UNCHANGED) -> None:
+        """Copy a clip: its skeleton and template, CLIP to CEND, and chunks that belong to it."""
         row = self.container.directory.clips[name]
         payload = self.container.payload(row.clip)
         head = parse_until(payloads.Clip, payload, row.clip.label, "signals")
         if head.name != name or head.skeleton != row.skeleton:
-            raise FormatError(f"{row.clip.label}: clip {head.name!r}, the index says {name!r}")
+            raise FormatError(f"{row.clip.label}: clip {head.name!r}, in the index {name!r}")
         if head.source is not None:
             self.shared(ChunkType.SRCE, head.source.template)
         self.skeleton(row.skeleton)
-        if change != SAME:
+        if change != UNCHANGED:
             payload = _apply_change(payload, row.clip.label, change)
         rate = change.rate
         new = PackedClipRow(
@@ -145,38 +145,37 @@ class ChunkCopier:
         self.writer.begin_carried(new, payload)
         self._copy_body(row, new)
         self.writer.end_carried()
-        self.behind(row)
+        self.copy_after_cend(row)
 
-    def behind(self, row: ClipRow, *, but: bytes = b"") -> None:
-        """Carry over the ancillary chunks behind CEND, those of the type ``but`` apart."""
+    def copy_after_cend(self, row: ClipRow, *, but: bytes = b"") -> None:
+        """Copy the ancillary chunks after CEND, except those of type ``but``."""
         for chunk in row.ancillary:
-            found = read_chunk(self.container.source, chunk.offset)
-            if found.type != chunk.type:
-                raise FormatError(f"{found.label} is {chunk.label} in the index")
-            if found.type != but:
-                self.ancillary(found)
+            data = read_chunk(self.container.source, chunk.offset)
+            if data.type != chunk.type:
+                raise FormatError(f"{data.label} is {chunk.label} in the index")
+            if data.type != but:
+                self.ancillary(data)
 
-    def inside(self, row: ClipRow) -> None:
+    def copy_before_cend(self, row: ClipRow) -> None:
         """Carry over the ancillary chunks between CLIP and CEND."""
         for chunk, _ in self._walk(row):
             if chunk.flags:
                 self.ancillary(chunk)
 
     def _walk(self, row: ClipRow) -> Iterator[tuple[Chunk, int]]:
-        """The chunks between CLIP and CEND, and where each ends."""
         if row.cend is None:  # of a damaged file
             raise FormatError(f"clip {row.name!r} has no CEND")
         at, stop = row.clip.stop, row.cend.offset
-        found = chunks(self.container.source, at, CLIP)
-        for chunk, at in takewhile(lambda one: one[0].offset < stop, found):
+        inner_chunks = chunks(self.container.source, at, CLIP)
+        for chunk, at in takewhile(lambda one: one[0].offset < stop, inner_chunks):
             yield chunk, at
         if at != row.cend.offset:
-            raise FormatError(f"{row.cend.label} is not where the index says", clip=row.name)
+            raise FormatError(f"{row.cend.label} is not at its place in the index", clip=row.name)
 
     def _copy_body(self, row: ClipRow, new: PackedClipRow) -> None:
-        """Copy the chunks from behind CLIP up to CEND; ``new`` records their places."""
+        """Copy the chunks after CLIP up to CEND; ``new`` records their places."""
         packed = segment_rows(row)
-        moved: list[tuple[int, int]] = []  # from where on how many bytes less lie before
+        moved: list[tuple[int, int]] = []  # (offset, number of removed bytes before it)
         less = 0
         for chunk, end in self._walk(row):
             if chunk.length is None:  # an open DATA, packets and all
@@ -199,14 +198,14 @@ class ChunkCopier:
 def metadata_records(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:
     """META records of the file, and of clips by their old and new names."""
     pairs = [("", ""), *names]
-    said = ((new, container.metadata_records(old)) for old, new in pairs)
-    return [merge_records(new, records) for new, records in said if records]
+    renamed = ((new, container.metadata_records(old)) for old, new in pairs)
+    return [merge_records(new, records) for new, records in renamed if records]
 
 
 def _move_segment(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> SegmentRow:
     less = max((size for start, size in moved if segment.offset >= start), default=0)
-    told = segment.told and _move_segment(segment.told, shift, moved)
-    return replace(segment, offset=segment.offset + shift - less, told=told)
+    model_row = segment.mask_row and _move_segment(segment.mask_row, shift, moved)
+    return replace(segment, offset=segment.offset + shift - less, mask_row=model_row)
 
 
 def _rename_part(part: bytes, name: str) -> bytes:

@@ -1,9 +1,8 @@
-"""Files of an archive that are read and coded ahead, by other processes: each becomes a part.
+"""Files of an archive that other processes read and encode ahead: each becomes a part.
 
-A part is an MCZ file of one file, whose chunks are carried over. Whatever depends on what the
-archive holds already (a name that is taken, the same file twice, a skeleton that is there) is
-decided where the parts are joined, in the order of the files; so the archive has the bytes that
-one process would write.
+A part is an MCZ file of one file, whose chunks are copied. Decisions that depend on the contents of
+the archive (a used name, a repeated file, a stored skeleton) are made where the parts are joined,
+in the order of the files; so the archive equals the one that a single process would write.
 """
 
 from __future__ import annotations
@@ -19,9 +18,9 @@ from mcz.container.limits import Profile
 from mcz.errors import MczError, WorkerError
 from mcz.files.editing.chunk_copier import Change
 from mcz.files.editing.folders import size_of
-from mcz.files.editing.rewriting import ALIAS, CLIP, SKELETON, carry, plan_whole
+from mcz.files.editing.rewriting import ALIAS, CLIP, SKELETON, copy_things, plan_whole
 from mcz.files.editing.stored_files import Content
-from mcz.files.jobs import ONE, Answer, useful_jobs
+from mcz.files.jobs import DEFAULT_JOBS, Answer, useful_jobs
 from mcz.files.jobs.pool import answers
 from mcz.files.reading.file import open
 from mcz.files.reading.parallel_clips import only_own
@@ -33,9 +32,9 @@ from mcz.sources import wants_skeleton
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One file, read and coded: ``data`` is an MCZ file of it alone.
+    """One encoded file: ``data`` is an MCZ file of it alone.
 
-    ``digest`` is the SHA-256 of the file that was read, the rest what ``SourceEncoder`` says of it.
+    ``digest`` is the SHA-256 of the source file, the rest are attributes of ``SourceEncoder``.
     """
 
     digest: bytes
@@ -49,7 +48,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class PartRequest:
-    """A file that is to be coded, for a file of which limits."""
+    """A file to encode, and the limits of the target."""
 
     path: Path
     name: str
@@ -63,7 +62,7 @@ def request_of(entry: SourceEncoder, profile: Profile) -> PartRequest:
 
 
 def encode_part(state: object, ask: PartRequest) -> Part:
-    """The part of a file; raises as ``SourceEncoder.write`` does."""
+    """The part of a file; raises as ``SourceEncoder.write``."""
     entry, sink = SourceEncoder(ask.path, ask.name, ask.options, ask.encoding), io.BytesIO()
     transaction = WriteTransaction(sink, ask.profile)
     result = entry.write(transaction)
@@ -74,23 +73,23 @@ def encode_part(state: object, ask: PartRequest) -> Part:
     return Part(digest, sink.getvalue(), result, entry.reason, entry.remark, entry.notes, inputs)
 
 
-class Joined(SourceEncoder):
-    """A SourceEncoder whose part another process has encoded; it takes the part over."""
+class EncodedPart(SourceEncoder):
+    """A SourceEncoder whose part another process has encoded; it copies the part."""
 
-    can_be_read = True  # here, too
+    can_be_read = True  # in this process too
 
     def __init__(self, entry: SourceEncoder, answer: Answer[Part]) -> None:
         super().__init__(entry.path, entry.name, entry.options, entry.encoding)
-        self.inputs = entry.inputs  # which its owner asks for
+        self.inputs = entry.inputs  # read by its owner
         self._answer = answer
 
     def write(self, transaction: WriteTransaction, progress: object = None) -> str:
-        """Write the file as ``SourceEncoder.write`` does; raises WorkerError if a process died."""
+        """Write the file as ``SourceEncoder.write``; raises WorkerError if a process died."""
         part = self._part()
         if part is None or part.digest != self.digest():
             return super().write(
                 transaction
-            )  # it fails, or has changed: with the words of one process
+            )  # it fails, or has changed: errors as from one process
         name = clip_name(self.name, transaction.writer.directory)
         if (
             self.can_be_read
@@ -117,8 +116,8 @@ class Joined(SourceEncoder):
             return None
 
 
-class RemotePart(Joined):
-    """One whose file lies where only those can read it that made the part, ``size`` bytes."""
+class RemotePart(EncodedPart):
+    """A part of a file that only its maker can read, ``size`` bytes."""
 
     can_be_read = False
 
@@ -138,21 +137,23 @@ class RemotePart(Joined):
 
 def join_part(part: Part, transaction: WriteTransaction, clip: str) -> None:
     """Carry the chunks of ``part`` over; its clip is called ``clip`` from now on."""
-    held = transaction.writer.directory
+    directory = transaction.writer.directory
     with open(part.data) as file:
         plan = plan_whole(file)
         for kind, name in list(plan.things):
             if kind == CLIP and name != clip:
                 plan.things[kind, name] = Change(clip)
-            elif kind == ALIAS and name in held.aliases and file.alias_of(name).kind == SKELETON:
+            elif (
+                kind == ALIAS and name in directory.aliases and file.alias_of(name).kind == SKELETON
+            ):
                 del plan.things[kind, name]
-        carry(file, transaction.writer, plan, lambda name: None)
+        copy_things(file, transaction.writer, plan, lambda name: None)
 
 
 def request_parts(
     entries: Iterable[SourceEncoder], transaction: WriteTransaction, seen: Content
 ) -> Iterator[PartRequest | None]:
-    """Yield the sources to encode ahead; None for one that may turn out to be there already."""
+    """Yield the sources to encode ahead; None for one that may be stored already."""
     sent: set[bytes] = set()
     for entry in entries:
         try:
@@ -160,7 +161,7 @@ def request_parts(
         except MczError:
             yield None
             continue
-        depends = wants_skeleton(entry.path)  # its values hang on the ASF beside it
+        depends = wants_skeleton(entry.path)  # its values depend on the ASF next to it
         is_there = not depends and (digest in seen or digest in sent)
         if is_there or entry.name in transaction.paths:
             yield None
@@ -173,18 +174,18 @@ def request_parts(
 def encode_ahead(
     entries: Sequence[SourceEncoder], transaction: WriteTransaction, seen: Content
 ) -> Iterator[Iterator[SourceEncoder]]:
-    """The entries in order, those ahead in work by other processes where that is worth it."""
+    """The entries in order, encoded ahead by other processes if worthwhile."""
     jobs = useful_jobs(len(entries), sum(size_of(entry.path) for entry in entries))
-    if jobs == ONE or not only_own():
+    if jobs == DEFAULT_JOBS or not only_own():
         yield iter(entries)
         return
-    with answers(encode_part, request_parts(entries, transaction, seen), jobs) as found:
-        yield join_parts(entries, found)
+    with answers(encode_part, request_parts(entries, transaction, seen), jobs) as parts:
+        yield join_parts(entries, parts)
 
 
 def join_parts(
-    entries: Iterable[SourceEncoder], found: Iterable[Answer[Part] | None]
+    entries: Iterable[SourceEncoder], parts: Iterable[Answer[Part] | None]
 ) -> Iterator[SourceEncoder]:
-    """The entries, with the parts that were made of them."""
-    for entry, answer in zip(entries, found, strict=True):
-        yield entry if answer is None else Joined(entry, answer)
+    """The entries, with their encoded parts."""
+    for entry, answer in zip(entries, parts, strict=True):
+        yield entry if answer is None else EncodedPart(entry, answer)

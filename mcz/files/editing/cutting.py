@@ -1,6 +1,7 @@
 """Cuts of stored clips by frames, joints or resolutions.
 
-SPEC.md, "Cutting without re-encoding", is normative. ``extraction.py`` writes what is planned here.
+SPEC.md, "Cutting without re-encoding", is normative. ``extraction.py`` writes the cuts planned
+here.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from mcz.errors import OptionError, error_context
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.hints import Hint
-from mcz.model.clock import numbering_of, part_begins
+from mcz.model.clock import numbering_of, part_first_time
 from mcz.model.motion import Skeleton
 from mcz.model.schema import build
 from mcz.model.skeleton import Chosen, Joints, joint_list
@@ -36,7 +37,7 @@ WITHOUT_CHANNELS = "the channels of other joints were cut"
 class SignalCut:
     """A cut of one signal: segments, groups, and all but ``dropped`` finest resolutions.
 
-    ``skip`` and ``spare`` are those of the cut signal.
+    ``skip`` and ``spare`` belong to the cut signal.
     """
 
     info: SignalInfo
@@ -60,7 +61,7 @@ class SignalCut:
 class ClipCut:
     """A cut of one clip: frames start <= f < stop, these joints (None: all).
 
-    ``signals`` are empty where it is coded ``anew``.
+    ``signals`` are empty if it is encoded again.
     """
 
     clip: Clip
@@ -69,7 +70,7 @@ class ClipCut:
     joints: frozenset[int] | None
     resolution: int
     signals: tuple[SignalCut, ...]
-    anew: bool = False  # what is left is decoded and coded again
+    is_recoded: bool = False  # decoded and encoded again
 
     @property
     def n_frames(self) -> int:
@@ -97,12 +98,12 @@ def plan_cut(
     frames: tuple[int, int | None] | None,
     joints: Joints,
     resolution: int,
-    anew: bool = False,
+    is_recoded: bool = False,
 ) -> ClipCut:
     """Plan a cut of ``clip``; raises OptionError or MotionError for an impossible one.
 
-    With ``anew`` joints may be chosen that are coded in one group with others, and no frame is
-    stored that is not shown.
+    With ``is_recoded``, joints may be chosen that share a group with others, and no hidden frame is
+    stored.
     """
     start, stop = frames if frames is not None else (0, None)
     stop = clip.n_frames if stop is None else stop
@@ -120,18 +121,18 @@ def plan_cut(
     groups = [tuple(range(info.counts.n_groups)) for info in clip.signals]
     if kept is not None:
         groups[0], mixed = groups_of(clip, kept)
-        if mixed is not None and anew:
-            return replace(cut, anew=True)
+        if mixed is not None and is_recoded:
+            return replace(cut, is_recoded=True)
         if mixed is not None:
             raise coded_together(clip, *mixed, "cut out, its channels are coded")
     signals = list(map(partial(_plan_signal, cut), clip.signals, groups))
-    if anew and any(part.skip or part.spare for part in signals):
-        return replace(cut, anew=True)
+    if is_recoded and any(part.skip or part.spare for part in signals):
+        return replace(cut, is_recoded=True)
     return replace(cut, signals=tuple(signals))
 
 
 def _find_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
-    """The joints as indices, None where no joint with channels is left out."""
+    """The joints as indices, None if no joint with channels is left out."""
     skeleton = clip.skeleton
     if not clip.signals[0].has_poses:
         raise OptionError("its motion has channels of its own, no joints", clip=clip.name)
@@ -161,7 +162,7 @@ def groups_of(
 
 
 def coded_together(clip: Clip, joint: int, other: int, text: str) -> OptionError:
-    """The error for a joint that is coded in one group with another, and the way out."""
+    """The error for a joint that shares a group with another, and the way out."""
     names, codec = clip.skeleton.addresses(), clip.signals[0].codec
     return OptionError(
         f"joint {names[joint]} cannot be {text} in one group with those of {names[other]}",
@@ -183,7 +184,7 @@ def _plan_signal(cut: ClipCut, info: SignalInfo, groups: tuple[int, ...]) -> Sig
 
 
 def _needed_rows(info: SignalInfo, start: int, stop: int) -> tuple[SegmentRow, ...]:
-    """The segments that bear upon the stored frames start <= f < stop, and those they need."""
+    """The segments that affect the stored frames start <= f < stop, and those they need."""
     hits = [
         index
         for index, row in enumerate(info.rows)
@@ -198,7 +199,7 @@ def _needed_rows(info: SignalInfo, start: int, stop: int) -> tuple[SegmentRow, .
 
 
 def clip_record(cut: ClipCut, skeleton: bytes, record: payloads.Clip) -> payloads.Clip:
-    """The CLIP of the cut clip, its source not yet changed; ``record``: that of before."""
+    """The CLIP of the cut clip, its source not yet changed; ``record``: the old one."""
     metadata = payloads.metadata_pairs(record.metadata)
     if cut.joints is not None:
         add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
@@ -215,7 +216,7 @@ def clip_record(cut: ClipCut, skeleton: bytes, record: payloads.Clip) -> payload
     clip, numbers = cut.clip, cut.clip.frame_numbers[cut.start : cut.stop]
     first_time = None
     if clip.first_time is not None:
-        first_time = part_begins(clip.first_time, clip.timeline, cut.start, cut.stop)
+        first_time = part_first_time(clip.first_time, clip.timeline, cut.start, cut.stop)
     put_time_base(new, time_base_of(numbers, first_time))
     if cut.joints is not None:
         keep_times(cut, new)
@@ -227,7 +228,7 @@ def _sorted_records(metadata: Mapping[str, str]) -> list[payloads.Metadata]:
 
 
 def note_source(record: payloads.Clip, text: str, cut: ClipCut | None = None) -> None:
-    """Add ``text`` to the ``source-note`` of a clip; ``cut``: whose times its numbers must tell."""
+    """Add ``text`` to the ``source-note`` of a clip; ``cut``: keep its times in its numbers."""
     if cut is not None:
         keep_times(cut, record)
     metadata = payloads.metadata_pairs(record.metadata)
@@ -236,17 +237,17 @@ def note_source(record: payloads.Clip, text: str, cut: ClipCut | None = None) ->
 
 
 def keep_times(cut: ClipCut, record: payloads.Clip) -> None:
-    """Let the time base tell the times of a cut, whose source may be gone."""
+    """Set the time base of a cut to its times, since its source may be gone."""
     if cut.clip.timeline is None or not cut.n_frames:
         return
     frames = slice(cut.start, cut.stop)
-    found = numbering_of(cut.clip.timeline.cut(frames), cut.clip.frame_numbers[frames])
-    if found is not None:
-        put_time_base(record, time_base_of(found.numbers, found.first_time))
+    numbered = numbering_of(cut.clip.timeline.cut(frames), cut.clip.frame_numbers[frames])
+    if numbered is not None:
+        put_time_base(record, time_base_of(numbered.numbers, numbered.first_time))
 
 
 def add_note(metadata: dict[str, str], key: str, text: str) -> None:
-    """Put ``text`` behind what the metadata say under ``key`` already, once."""
+    """Append ``text`` to the metadata value of ``key``, once."""
     old = metadata.get(key, "")
     if text not in old:
         metadata[key] = f"{old}; {text}" if old else text
@@ -276,10 +277,10 @@ def _signal_record(part: SignalCut, record: payloads.Signal) -> payloads.Signal:
 
 
 class Unchanged:
-    """The streams of a segment as they are; an edit has others."""
+    """The streams of a segment, unchanged; an edit has others."""
 
-    def beside(self, flag: int, group: int, old: bytes) -> bytes:
-        """Group notes or a mask, as ``flag`` says."""
+    def group_data(self, flag: int, group: int, old: bytes) -> bytes:
+        """Group notes or a mask, by ``flag``."""
         return old
 
     def coded(self, resolution: int, group: int, old: bytes) -> bytes:
@@ -298,7 +299,7 @@ def cut_segment(
     noted: bool,
     edit: Unchanged = UNCHANGED,
 ) -> tuple[SegmentHeader, list[bytes], bytes]:
-    """Header, streams and extension of what is left of a segment; ``noted``: with frame notes.
+    """Header, streams and extension of a cut segment; ``noted``: with frame notes.
 
     Its chunk is read whole, so that damage is found and not copied.
     """
@@ -311,13 +312,13 @@ def cut_segment(
         kept.append(streams[index])
     for flag, stream_of in ((GROUP_NOTES, table.group_notes), (MASKS, table.mask)):
         numbers = [(group, stream_of(group)) for group in part.groups]
-        found = [
-            edit.beside(flag, group, b"" if number is None else streams[number])
+        cut_streams = [
+            edit.group_data(flag, group, b"" if number is None else streams[number])
             for group, number in numbers
         ]
-        if any(found) or (found and header.flags & flag):
+        if any(cut_streams) or (cut_streams and header.flags & flag):
             flags |= flag
-            kept += found
+            kept += cut_streams
     if not part.has_all_groups and part.info.codec.subset is not None:
         span = Span(row.header.first, row.header.n_frames)
 
@@ -350,10 +351,10 @@ def cut_skeleton(payload: bytes, id_: bytes, joints: frozenset[int], profile: Pr
 
 
 def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
-    """The entries of the quality record of a cut clip; ``old`` are those of the clip it came from.
+    """The entries of the quality record of a cut clip; ``old`` are those of the original clip.
 
-    All are as they are stored: a cut leaves each joint its index. Where these say of a former cut
-    what cannot be, it is taken for none. docs/guides/parts.md, "Keys of cuts", has their meaning.
+    All are as stored: a cut leaves each joint its index. Impossible entries on a former cut are
+    ignored. docs/guides/parts.md, "Keys of cuts", has their meaning.
     """
     now = _cut_entries(cut, old)
     for key, value in old.items():
@@ -367,7 +368,7 @@ def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
 def recoded_quality(
     cut: ClipCut, old: Mapping[str, str], now: dict[str, str], _: Sequence[Values]
 ) -> dict[str, str]:
-    """The entries for a clip that was cut and coded anew; ``now`` are those of this coding."""
+    """The entries for a clip that was cut and encoded again; ``now`` are the new ones."""
     before = {k: v for k, v in cut_quality(cut, old).items() if not k.startswith("param.")}
     return before | {"cut-recoded": "yes"} | now
 
@@ -386,7 +387,7 @@ def _cut_entries(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
 
 
 def _first_number(text: str, count: int) -> int:
-    """The first of ``count`` numbers with colons between them, 0 where the text is another."""
+    """The first of ``count`` numbers with colons between them, 0 for another text."""
     words = text.split(":")
     good = len(words) == count and all(re.fullmatch("[0-9]{1,16}", word) for word in words)
     return int(words[0]) if good else 0

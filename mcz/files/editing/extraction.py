@@ -1,7 +1,7 @@
 """``extract``: frames, joints and coarser resolutions cut out of the stored bytes of a file.
 
-Streams are copied byte for byte, SPEC.md, "Cutting without re-encoding"; only where a caller allows
-it is what cannot be cut coded anew (``reencode.py``).
+Streams are copied byte for byte, SPEC.md, "Cutting without re-encoding". A clip that cannot be cut
+is decoded and encoded again (``reencode.py``), if the caller allows it.
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ from mcz.sources import FORMATS
 
 @dataclass(frozen=True, slots=True)
 class ExtractedClip:
-    """An extracted clip: frames a <= f < b, joints (None: all), finest resolutions.
+    """An extracted clip: frames a <= f < b, joints (None: all), number of resolutions left out.
 
-    ``stored_frames`` are those whose bytes were copied; the two sizes are of whole DATA payloads.
-    ``recoded``: it was decoded and coded anew.
+    ``stored_frames`` counts the frames whose bytes were copied; the two sizes are of whole DATA
+    payloads. ``recoded``: it was decoded and encoded again.
     """
 
     name: str
@@ -80,9 +80,9 @@ class ExtractedClip:
 
 @dataclass(slots=True)
 class Extraction:
-    """The outcome of ``extract``, and parts of the source file that it left out uncut.
+    """The outcome of ``extract``, and parts left out because they cannot be cut.
 
-    ``damage`` is what salvage found wrong.
+    ``damage`` lists faults found by salvage.
     """
 
     clips: list[ExtractedClip] = field(default_factory=list)
@@ -109,20 +109,18 @@ def extract(
     recode: bool = False,
     progress: Progress | None = None,
 ) -> Extraction:
-    """Write what is left of the MCZ file ``source`` when all else is cut, without re-encoding.
+    """Copy frames, joints, resolutions or clips of ``source`` to a new file, without re-encoding.
 
     ``resolution``: the number of finest resolutions to leave out. ``joints``: those whose channels
-    are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end.
-    ``clip``: take out this clip, or these, alone; otherwise all are cut, and attachments kept.
-    ``where``: keep only the clips that match it, see ``File.find``.
-    ``salvage``: the file may be damaged, but not in what is taken out.
-    ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
-    ``copies``: as ``mcz.write`` has it; None: where ``source`` has some.
-    ``recode``: a clip is decoded and coded anew, as it was, where joints are coded in one group
-    with others, which are refused by default, or where frames that are cut off would stay in the
-    file, since those that are left need them.
-    Raises OptionError or MotionError for what cannot be cut so, and where the target is the source;
-    FormatError for bad bytes; nothing is left under the target's name then.
+    are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end. ``clip``:
+    keep only this clip, or these; otherwise all are cut, and attachments kept. ``where``: keep only
+    the clips that match it, see ``File.find``. ``salvage``: damage outside of the kept parts is
+    allowed. ``max_decoded``: as in ``mcz.open``; the result is decoded once to hash it. ``copies``:
+    as in ``mcz.write``; None: where ``source`` has some. ``recode``: encode a clip again where
+    copying is impossible: where joints share a group with others, which is refused by default, or
+    where frames outside of the cut are needed to decode it. Raises OptionError or MotionError for
+    what cannot be cut, and where the target is the source; FormatError for bad bytes; nothing is
+    left under the target's name then.
     """
     alone = clip is not None or where is not None
     if not resolution and joints is None and frames is None and not alone:
@@ -135,7 +133,7 @@ def extract(
             raise OptionError("it has no clip to extract from", path=file.name)
         cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
         for cut in cuts:
-            if cut.anew:
+            if cut.is_recoded:
                 check_anew(cut.clip, whole=cut.joints is None)
         with replacing_file(target, force=force, inputs=(source,)) as stream:
             copier = Copier(Copying(file, stream, progress, copies))
@@ -147,7 +145,7 @@ def extract(
 
 @dataclass(frozen=True, slots=True)
 class Copying:
-    """A file and where it is copied to; ``copies`` None: where it has some."""
+    """A file and the target of its copy; ``copies`` None: if the file has some."""
 
     file: File
     stream: BinaryIO
@@ -156,7 +154,7 @@ class Copying:
 
 
 class Copier(ChunkCopier):
-    """Copies what is left of a file."""
+    """Copies the kept parts of a file."""
 
     def __init__(self, copying: Copying) -> None:
         file = copying.file
@@ -169,14 +167,14 @@ class Copier(ChunkCopier):
         """Write the new file; ``alone``: these clips and what they need, nothing else."""
         self.total = sum(len(part.rows) for cut in cuts for part in cut.signals)
         for (kind, _), chunk in self.container.directory.shared.items():
-            if kind == ChunkType.MODL:  # which one a clip needs, its codec alone knows
+            if kind == ChunkType.MODL:  # only the codec knows which models a clip needs
                 self.writer.shared(kind, self.container.payload(chunk))
         if not alone:
             self.skeletons()
             self.before_clips()
             self.attachments()
         for cut in cuts:
-            if cut.anew:
+            if cut.is_recoded:
                 self.write_anew(cut)
             else:
                 self.write(cut)
@@ -187,7 +185,7 @@ class Copier(ChunkCopier):
         self.writer.finish()
 
     def skeletons(self) -> None:
-        """Copy every skeleton, also those that no clip has."""
+        """Copy every skeleton, also those without a clip."""
         for kind, id_ in self.container.directory.shared:
             if kind == ChunkType.SKEL:
                 self.skeleton(id_)
@@ -197,7 +195,7 @@ class Copier(ChunkCopier):
             self.attachment(name)
 
     def is_same(self, cut: ClipCut) -> bool:
-        return cut.is_whole and not cut.anew
+        return cut.is_whole and not cut.is_recoded
 
     def write(self, cut: ClipCut) -> None:
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
@@ -212,7 +210,7 @@ class Copier(ChunkCopier):
         source, hashes = self.finish_record(cut, new)
         new.name = self.name_of(cut)
         self.writer.begin_clip(new)
-        self.inside(row)
+        self.copy_before_cend(row)
         rows = [(own, part) for part in cut.signals for own in part.rows]
         for own, part in sorted(rows, key=lambda pair: pair[0].offset):
             self.writer.segment(*self.segment(cut, part, own, noted=bool(new.source)))
@@ -224,16 +222,16 @@ class Copier(ChunkCopier):
         missing = cend.missing if cend is not None and cut.is_whole else []
         self.writer.end_clip(cut.n_frames, source, hashes, extension, missing)
         self.quality(cut, row)
-        self.note(cut)
+        self.record_result(cut)
 
     def segment(
         self, cut: ClipCut, part: SignalCut, row: SegmentRow, *, noted: bool
     ) -> tuple[SegmentHeader, list[bytes], bytes]:
-        """Header, streams and extension of what is left of a segment."""
+        """Write the header, streams and extension of the kept part of a segment."""
         return cut_segment(self.container, part, row, noted=noted)
 
     def write_anew(self, cut: ClipCut) -> None:
-        """Write what is left of a clip, decoded and coded anew."""
+        """Write the kept part of a clip, decoded and encoded again."""
         clip, old = cut.clip, cut.clip.stored_quality or {}
         motion = replace(joints_alone(cut), name=self.name_of(cut))
         settings = settings_of(clip) if cut.joints is None else settings_of_joints(clip)
@@ -243,13 +241,13 @@ class Copier(ChunkCopier):
                 self._leave_out(cut, f"its {name}, which other joints have a part in")
         if clip.source is not None and cut.joints is not None:
             self._leave_out(cut, "its source file, as joints were cut")
-        self.note(cut)
+        self.record_result(cut)
 
     def _leave_out(self, cut: ClipCut, text: str) -> None:
         self.left_out.append(f"clip {cut.clip.name}: {text}")
 
     def recode(self, clip: Clip, motion: Motion, settings: Params, amend: Amend) -> dict[str, str]:
-        """Write ``motion``, coded anew, in the place of ``clip``; return its quality record.
+        """Encode ``motion`` in the place of ``clip``; return its quality record.
 
         ``amend`` edits the new quality record before it is written; lossless codecs have none.
         """
@@ -260,8 +258,8 @@ class Copier(ChunkCopier):
             self.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
         prepared = prepare(motion, codec, settings)
         record = write_motion(self.writer, prepared, codec, settings, self.progress, amend=amend)
-        self.inside(row)
-        self.behind(row, but=CHUNK)
+        self.copy_before_cend(row)
+        self.copy_after_cend(row, but=CHUNK)
         return record or {}
 
     def record_of(self, cut: ClipCut) -> payloads.Clip:
@@ -284,7 +282,7 @@ class Copier(ChunkCopier):
         return source, hashes
 
     def _drop_units(self, cut: ClipCut, new: payloads.Clip) -> None:
-        """Drop the units of words whose meaning only the source told."""
+        """Drop the units of stored integers that only the source file could scale."""
         for info, signal in zip(cut.clip.signals, new.signals, strict=True):
             if cut.clip.is_scaled(info.index):
                 signal.channels = [replace(own, unit="") for own in signal.channels or ()]
@@ -293,28 +291,28 @@ class Copier(ChunkCopier):
                 self._leave_out(cut, f"what {words} mean, as its source file was cut")
 
     def _hash_decoded(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
-        """The hashes of what is left, decoded once, and the source file that it has now."""
-        held = new.source
-        if held and cut.joints is not None:
+        """The hashes of the kept part, decoded once, and its source file."""
+        source = new.source
+        if source and cut.joints is not None:
             new.source = None
             note_source(new, WITHOUT_SOURCE)
             self._leave_out(cut, "its source file, as joints were cut")
-        elif held:
+        elif source:
             motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
             hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
-            if motion.source is None:  # of a damaged file; the template may say why
-                self.container.template(held.template, held.format)
+            if motion.source is None:  # a damaged file; the template may give the reason
+                self.container.template(source.template, source.format)
                 raise FormatError("it cannot be put together")
             return self.put_source(cut, new, motion), hashes
         return b"", [self._value_hash(cut, part) for part in cut.signals]
 
     def put_source(self, cut: ClipCut, new: payloads.Clip, motion: Motion) -> bytes:
-        """Let the source of a clip be that of ``motion``; its hash, b"" where it cannot be."""
-        held, changed = new.source, stating_rate(motion, cut.clip.frame_numbers)
-        assert held is not None and changed.source is not None
+        """Set the clip's source to ``motion``'s; returns its SHA-256, b"" if it was left out."""
+        source, changed = new.source, stating_rate(motion, cut.clip.frame_numbers)
+        assert source is not None and changed.source is not None
         if changed is not motion:
-            template = self.writer.template(held.format, changed.source.template)
-            held = replace(held, template=template)
+            template = self.writer.template(source.format, changed.source.template)
+            source = replace(source, template=template)
         try:
             data = FORMATS[changed.source.format].write(changed)
         except MotionError as error:
@@ -323,11 +321,11 @@ class Copier(ChunkCopier):
             note_source(new, text, None if cut.is_whole else cut)
             self._leave_out(cut, f"its source file, as {error}")
             return b""
-        new.source = replace(held, size=len(data))
+        new.source = replace(source, size=len(data))
         return hashlib.sha256(data).digest()
 
     def _value_hash(self, cut: ClipCut, part: SignalCut) -> bytes:
-        """The hash of what is left of a signal, a few segments in memory at a time."""
+        """The hash of the kept part of a signal, a few segments in memory at a time."""
         info, digest = part.info, ValueDigest()
         reader = SignalReader(self.container, info, part.groups, part.dropped, cut.clip.name)
         for block in reader.blocks(cut.start + info.skip, cut.stop + info.skip):
@@ -337,7 +335,7 @@ class Copier(ChunkCopier):
     def quality(self, cut: ClipCut, row: ClipRow) -> None:
         """Write the quality record, edited if the clip was cut, and copy other ancillary chunks."""
         if self.is_same(cut):
-            self.behind(row)
+            self.copy_after_cend(row)
             return
         records = [chunk for chunk in row.ancillary if chunk.type == CHUNK]
         record = payloads.Qual(entries=[])
@@ -345,21 +343,21 @@ class Copier(ChunkCopier):
             payload = self.container.payload(records[0])
             record = parse(payloads.Qual, payload, records[0].label)
         old = {entry.key: entry.value for entry in record.entries}
-        now = self.entries(cut, old if records else None)
-        if now is not None:
-            record.entries = payloads.metadata_records(now)
+        entries = self.entries(cut, old if records else None)
+        if entries is not None:
+            record.entries = payloads.metadata_records(entries)
             self.writer.ancillary(CHUNK, build(record, "quality record"))
-        self.behind(row, but=CHUNK)
+        self.copy_after_cend(row, but=CHUNK)
 
     def entries(self, cut: ClipCut, old: Mapping[str, str] | None) -> dict[str, str] | None:
-        """Entries of the quality record from those of before; None: there is no record."""
+        """Entries of the new quality record from the old ones; None: no record."""
         return cut_quality(cut, old or {})
 
-    def note(self, cut: ClipCut) -> None:
+    def record_result(self, cut: ClipCut) -> None:
         written = self.writer.directory.clips[self.name_of(cut)].segments
         before = [row for info in cut.clip.signals for row in info.rows]
         stored = cut.n_frames
-        if not cut.anew:
+        if not cut.is_recoded:
             stored += cut.signals[0].skip + cut.signals[0].spare
             n_frames = sum(row.header.n_frames for part in cut.signals for row in part.rows)
             assert n_frames == sum(row.header.n_frames for row in written)
@@ -372,12 +370,12 @@ class Copier(ChunkCopier):
                 stored,
                 sum(row.size for row in written),
                 sum(row.size for row in before),
-                cut.anew,
+                cut.is_recoded,
             )
         )
 
     def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
-        """Copy the aliases of what is here and as it was."""
+        """Copy the aliases of things that were copied unchanged."""
         for name, (of, target) in self.file.aliases.items():
             if of == payloads.OF_CLIP:
                 cut = cuts.get(target.decode("utf-8", "replace"))

@@ -11,39 +11,39 @@ from pathlib import Path
 
 from mcz.errors import AccessError, OptionError, reason_of, remark_of
 from mcz.files.editing.batch_report import Outcome
-from mcz.files.reading.clips import FEW, list_some
+from mcz.files.reading.clips import MOST_NAMES, list_some
 from mcz.hints import Hint, Remark
 from mcz.model.types import Target
 from mcz.sources import FORMATS
 
-SNIFFED = 2**16  # bytes that tell what a file is
+SNIFFED = 2**16  # bytes at the start that show the type of a file
 
 
 def files_below(root: Path, target: Target | None) -> tuple[list[Path], list[Outcome]]:
-    """The files below ``root`` but for an earlier ``target``, and what else there is, in order."""
-    own = Path(target).resolve() if isinstance(target, (str, os.PathLike)) else None
-    if own is not None and own.suffix.lower() != ".mcz":
-        own = None  # a file to be packed, which may not be replaced
+    """The files below ``root`` except the target, sorted; and outcomes of other entries."""
+    archive = Path(target).resolve() if isinstance(target, (str, os.PathLike)) else None
+    if archive is not None and archive.suffix.lower() != ".mcz":
+        archive = None  # not an archive: it is packed, and not overwritten
     files: list[Path] = []
     others: list[Outcome] = []
 
-    def say(path: Path, result: str, text: str) -> None:
+    def add_outcome(path: Path, result: str, text: str) -> None:
         others.append(Outcome(path.relative_to(root).as_posix(), result, 0, text))
 
     def unreadable(error: OSError) -> None:
         if Path(error.filename) == root:
             raise AccessError(reason_of(error), path=root) from None
-        say(Path(error.filename), "failed", remark_of(error))
+        add_outcome(Path(error.filename), "failed", remark_of(error))
 
     for folder, folders, names in os.walk(root, onerror=unreadable):
         for path in (Path(folder, name) for name in (*folders, *names)):
             if path.is_symlink():
-                say(path, "skipped", "a symbolic link; only files are packed")
+                add_outcome(path, "skipped", "a symbolic link; only files are packed")
             elif path.is_file():
-                if path.resolve() != own:
+                if path.resolve() != archive:
                     files.append(path)
             elif not path.is_dir():
-                say(path, "skipped", "neither a file nor a folder")
+                add_outcome(path, "skipped", "neither a file nor a folder")
 
     def key(name: str) -> bytes:
         return os.fsencode(name)
@@ -60,9 +60,9 @@ def motion_files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
 
 
 def _is_motion(path: Path) -> bool:
-    """Return True for a suffix of a source format, with fitting content where others use it, too.
+    """Return True for a suffix of a source format and, if other formats share it, fitting content.
 
-    One that cannot be read counts: whoever wants it is told so.
+    An unreadable file counts: opening it reports the error.
     """
     suffix = path.suffix.lower()
     for source_format in FORMATS.values():
@@ -86,12 +86,14 @@ def skipped_outcome(path: Path, root: Path) -> Outcome:
 
 
 def dropped_facts(root: Path, packed: Sequence[Path], *, with_times: bool) -> Iterator[str]:
-    """Parts of a folder that no archive has: empty folders, modes, and times but of clips."""
+    """Parts of a folder that no archive has: empty folders, modes, times of some files."""
 
     def some(word: str, paths: Iterable[Path]) -> Iterator[str]:
         names = [path.relative_to(root).as_posix() for path in paths]
         if names:
-            yield f"{word}: {list_some(names)}" + (f" ({len(names)} in all)" if names[FEW:] else "")
+            yield f"{word}: {list_some(names)}" + (
+                f" ({len(names)} in all)" if names[MOST_NAMES:] else ""
+            )
 
     walk = os.walk(root)
     yield from some(
@@ -122,20 +124,20 @@ def find_sources(
     """The files that ``sources`` name, each with its name in an archive; and what is left out.
 
     A folder stands for the motion files below it, under their paths relative to it. ``root``: all
-    names are relative to that; raises OptionError for a file that does not lie below.
+    names are relative to it; raises OptionError for a file outside of it.
     """
-    found: list[tuple[Path, str]] = []
+    files: list[tuple[Path, str]] = []
     skipped: list[Outcome] = []
     for source in map(Path, sources):
         if not source.is_dir():
-            found.append((source, source.name if root is None else _relative(source, root)))
+            files.append((source, source.name if root is None else _relative(source, root)))
             continue
         paths, others = files_below(source, target)
-        paths, left = motion_files(paths)
-        skipped += [*others, *(skipped_outcome(path, source) for path in left)]
+        paths, others_ = motion_files(paths)
+        skipped += [*others, *(skipped_outcome(path, source) for path in others_)]
         base = source if root is None else root
-        found += [(path, _relative(path, base)) for path in paths]
-    return found, skipped
+        files += [(path, _relative(path, base)) for path in paths]
+    return files, skipped
 
 
 def _relative(path: Path, root: str | os.PathLike[str]) -> str:
@@ -146,7 +148,7 @@ def _relative(path: Path, root: str | os.PathLike[str]) -> str:
 
 
 SECOND = 10**9
-FORM = re.compile(r"([0-9-]{10}T[0-9:]{8})(?:\.([0-9]{1,9}))?Z")
+TIMESTAMP = re.compile(r"([0-9-]{10}T[0-9:]{8})(?:\.([0-9]{1,9}))?Z")
 
 
 def stamp(path: Path) -> str:
@@ -164,8 +166,8 @@ def stamp(path: Path) -> str:
 
 
 def nanoseconds(text: str) -> int | None:
-    """Nanoseconds since 1970; None for what is no such time."""
-    match = FORM.fullmatch(text)
+    """Nanoseconds since 1970; None if the text is not such a time."""
+    match = TIMESTAMP.fullmatch(text)
     if not match:
         return None
     try:
@@ -176,8 +178,8 @@ def nanoseconds(text: str) -> int | None:
 
 
 def set_time(path: Path, text: str | None) -> bool:
-    """Give a file the time that its metadata state; return whether they do."""
-    found = None if text is None else nanoseconds(text)
-    if found is not None:
-        os.utime(path, ns=(found, found))
-    return found is not None
+    """Set the modification time to a metadata text; return whether it is a time."""
+    time = None if text is None else nanoseconds(text)
+    if time is not None:
+        os.utime(path, ns=(time, time))
+    return time is not None

@@ -1,7 +1,7 @@
-"""Several MCZ files in one: chunks are carried over as they are, what they share is written once.
+"""Several MCZ files in one: chunks are copied unchanged, shared ones are written once.
 
-Nothing is re-encoded (``chunk_copier.py``). Two different things under one name are never mixed:
-that is refused, or the later one is renamed.
+``chunk_copier.py`` copies without re-encoding. Two different things under one name are never mixed:
+they are refused, or the later one is renamed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mcz.files.editing.rewriting import (
     SKELETON,
     Plan,
     Thing,
-    carry,
+    copy_things,
     path_of,
     plan_whole,
     steps,
@@ -52,20 +52,20 @@ def merge(
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
-    """Put all that several MCZ files hold into one, clips in the order of the files.
+    """Put the contents of several MCZ files into one, clips in the order of the files.
 
-    A name that two of them have, or a path that both restore, is refused. ``skip_identical``: one
-    that means the same content in both is taken once. ``rename``: the later one is put below the
-    name of its file, "walk" of day2.mcz becomes "day2/walk", and so is its source. The own files
-    of skeletons that are the same under one name are always taken once. Raises OptionError, which
-    names what is double; nothing is left under the target's name then.
+    A name that two of them have, or a path that both restore, is refused. ``skip_identical``: a
+    thing with the same content in both is copied once. ``rename``: the later one is put below the
+    name of its file, "walk" of day2.mcz becomes "day2/walk", and so does its source. Equal files of
+    skeletons under one name are always copied once. Raises OptionError, which names the duplicates;
+    nothing is left under the target's name then.
 
-    Recovery data are of one file. Where all files have some, the new one has its own, in the
-    greatest share of theirs; where only some have, the report says so.
+    Recovery data belong to one file. If all files have some, the new one gets its own, with the
+    greatest redundancy of them; if only some have, the report mentions it.
     """
     if not sources:
         raise OptionError("nothing to merge: name MCZ files")
-    merging = Merging(rename, skip_identical)
+    merging = Merger(rename, skip_identical)
     with (
         merging.plans(sources) as plans,
         replacing_file(target, force=force, inputs=sources) as stream,
@@ -82,7 +82,7 @@ def merge(
 
 
 def _share_of_all(files: Sequence[File]) -> float | None:
-    """The greatest share of recovery data that a file has; None where not all have some."""
+    """The greatest redundancy of the files; None if one has no recovery data."""
     shares = [redundancy_of(file.container) for file in files]
     known = [share for share in shares if share is not None]
     return max(known) if len(known) == len(shares) else None
@@ -96,15 +96,15 @@ def add_files(
     skip_identical: bool,
     progress: Progress | None,
 ) -> Report:
-    """Carry what MCZ files hold over to ``transaction``, which adds to the file ``before``.
+    """Copy the contents of MCZ files to ``transaction``, which adds to the file ``before``.
 
-    Raises as ``merge`` does.
+    Raises as ``merge``.
     """
-    # Content that was written just now is like no other: it cannot be read yet.
+    # Newly written content is unique: it cannot be read yet.
     there: dict[Thing, Callable[[], object]] = dict.fromkeys(
         things_in(transaction.writer.directory), object
     )
-    merging = Merging(rename, skip_identical, there)
+    merging = Merger(rename, skip_identical, there)
     merging.things |= {thing: _content(before, thing) for thing in things_in(before)}
     merging.paths.update(transaction.paths)
 
@@ -119,11 +119,11 @@ def add_files(
 
 
 @dataclass(slots=True)
-class Merging:
-    """Files that are put into one, and what the new file holds so far.
+class Merger:
+    """Files that are merged, and the contents of the new file up to now.
 
-    ``things`` have what tells the content of each, ``paths`` are those of all files that it
-    restores. ``rename`` and ``skip_identical`` are those of ``merge``.
+    ``things`` identify the content of each, ``paths`` are those of all files that it restores.
+    ``rename`` and ``skip_identical`` are those of ``merge``.
     """
 
     rename: bool
@@ -134,20 +134,20 @@ class Merging:
 
     @contextmanager
     def plans(self, sources: Sequence[str | os.PathLike[str]]) -> Iterator[list[tuple[File, Plan]]]:
-        """The files, and what of each goes into the new one; raises OptionError as ``merge``."""
+        """The files, and the parts of each to copy; raises OptionError as ``merge``."""
         with ExitStack() as stack:
             files = [stack.enter_context(open(source)) for source in sources]
             double: list[str] = []
-            found = [(file, self._plan_file(file, double)) for file in files]
+            pairs = [(file, self._plan_file(file, double)) for file in files]
             if double:
                 raise OptionError(
                     f"{list_some(double)}: {counted(len(double), 'name')} in more than one file; "
                     "rename the later ones, or skip those of identical content"
                 )
-            yield found
+            yield pairs
 
     def _plan_file(self, file: File, double: list[str]) -> Plan:
-        """Plan the parts of ``file`` that are carried over; ``double`` learns refused ones."""
+        """Plan the parts of ``file`` to copy; refused names are added to ``double``."""
         plan = plan_whole(file)
         for thing in list(plan.things):
             kind, name = thing
@@ -156,7 +156,7 @@ class Merging:
             may_skip = there is not None and (self.skip_identical or of_skeleton)
             new = ""
             if there is not None and may_skip and there() == _content(file, thing)():
-                del plan.things[thing]  # aliases lead to what is there
+                del plan.things[thing]  # aliases refer to the present one
                 new, result = "the same content", "present"
             elif there is None and path_of(file, thing) not in self.paths:
                 result = "copied"
@@ -187,15 +187,15 @@ class Merging:
     def carry(
         self, plans: Sequence[tuple[File, Plan]], writer: Writer, progress: Progress | None
     ) -> None:
-        """Write what the plans say of their files."""
-        step = steps(progress, sum(len(plan.of(CLIP)) for _, plan in plans))
+        """Copy the planned parts of the files."""
+        step = steps(progress, sum(len(plan.things_of(CLIP)) for _, plan in plans))
         for file, plan in plans:
-            left_out = carry(file, writer, plan, step)
+            left_out = copy_things(file, writer, plan, step)
             self.report.left_out += [f"{file.name}: {text}" for text in left_out]
 
 
 def _content(file: File, thing: Thing) -> Callable[[], object]:
-    """A finder of the content of a thing, the same in two that can stand for each other."""
+    """A finder of the content of a thing, equal for two that can replace each other."""
     kind, name = thing
     if kind == ALIAS:
         return _alias_content(file, name)
@@ -217,7 +217,6 @@ def _attachment_content(file: File, name: str) -> tuple[int, bytes]:
 
 
 def _alias_content(file: File, alias: str) -> Callable[[], object]:
-    """The content of what an alias stands for; of a skeleton's file its id."""
     kind, name = file.alias_of(alias)
     if kind == CLIP and name in file.clips.rows:
         source = file.clips[name].source

@@ -36,34 +36,34 @@ from mcz.model.text_format import among, cell_text, shown
 from mcz.model.types import Progress, Target
 from mcz.sources import FORMATS
 
-Said = Mapping[str, str | None]  # a key and its value; None: it is not there any more
+Entries = Mapping[str, str | None]  # a key and its value; None: removed
 
 
 def set_metadata(
     target: str | os.PathLike[str],
-    changes: Mapping[str, Said],
+    changes: Mapping[str, Entries],
     *,
     force: bool = False,
     purge: bool = False,
     progress: Progress | None = None,
 ) -> Report:
-    """Say something of clips of an MCZ file, or of the file as a whole.
+    """Set metadata of clips of an MCZ file, or of the file as a whole.
 
     ``changes``: of each clip by its name, "" for the file, keys of the registry (or ``x-...``) and
-    their values; None removes a key. It is appended (SPEC.md, "META"), so that no byte of a clip is
-    touched, and what was said before is still in the bytes until the file is rewritten: ``purge``
-    rewrites it so that nothing of that is left. Otherwise nothing is written where nothing changes.
-    Raises OptionError for a name, a key or a value that cannot be, and AccessError while another
-    process is appending; ``force`` is that of ``mcz.append``.
+    their values; None removes a key. They are appended (SPEC.md, "META"), so that no byte of a clip
+    changes, and old values remain in the bytes until the file is rewritten: ``purge`` rewrites it
+    without them. Otherwise nothing is written without a change. Raises OptionError for a bad name,
+    key or value, and AccessError while another process is appending; ``force`` is as in
+    ``mcz.append``.
     """
-    changes = {name: _respell(said) for name, said in changes.items()}
-    for said in changes.values():
-        for key, value in said.items():
+    changes = {name: _respell(entries) for name, entries in changes.items()}
+    for entries in changes.values():
+        for key, value in entries.items():
             check_pair(key, value)
     report = Report()
     with growing(Path(target), salvage=False, force=force) as growth:
         file = File(growth.container)
-        records = [_changes_record(file, name, said) for name, said in changes.items()]
+        records = [_changes_record(file, name, entries) for name, entries in changes.items()]
         records = [record for record in records if record.entries or record.removed]
         for record in records:
             text = ", ".join([*record.entries, *(f"no {key}" for key in record.removed)])
@@ -87,10 +87,10 @@ def set_metadata(
 
 
 def _purge(target: str | os.PathLike[str], progress: Progress | None) -> list[str]:
-    """Rewrite a file so that its metadata stand in CLIP; return what was left out."""
+    """Rewrite a file so that its metadata are in CLIP; return what was left out."""
     with rewriting(target) as job:
         report, plan = Report(), plan_whole(job.file)
-        plan.purges = True  # META-09
+        plan.drops_meta = True  # META-09
         for clip in job.file:
             plan.things[CLIP, clip.name] = Change(metadata=clip.metadata)
         job.write(plan, report, steps(progress, len(job.file.clips)))
@@ -98,24 +98,24 @@ def _purge(target: str | os.PathLike[str], progress: Progress | None) -> list[st
 
 
 def registered_key(key: str) -> str:
-    """A key as it is registered: ``license`` is ``licence``."""
+    """The registered spelling of a key: ``license`` is ``licence``."""
     return SPELLINGS.get(key, key)
 
 
-def _respell(said: Said) -> Said:
-    """``said`` under registered keys; raises OptionError where two of them are one."""
-    found = {registered_key(key): value for key, value in said.items()}
-    if len(found) < len(said):
-        twice = next(key for key in SPELLINGS if key in said)
+def _respell(entries: Entries) -> Entries:
+    """``entries`` under registered keys; raises OptionError for two spellings of one."""
+    respelled = {registered_key(key): value for key, value in entries.items()}
+    if len(respelled) < len(entries):
+        twice = next(key for key in SPELLINGS if key in entries)
         raise OptionError(f"{twice!r} and {SPELLINGS[twice]!r} are one key")
-    return found
+    return respelled
 
 
-def _changes_record(file: File, name: str, said: Said) -> Record:
+def _changes_record(file: File, name: str, changes: Entries) -> Record:
     clip = file.only_clip(name) if name else None
     before = file.metadata if clip is None else clip.metadata
-    entries = {k: v for k, v in said.items() if v is not None and before.get(k) != v}
-    removed = tuple(key for key, value in said.items() if value is None and key in before)
+    entries = {k: v for k, v in changes.items() if v is not None and before.get(k) != v}
+    removed = tuple(key for key, value in changes.items() if value is None and key in before)
     record = Record(clip.name if clip is not None else "", entries, removed)
     return record if apply_records(before, [record]) != before else Record(record.name)
 
@@ -130,12 +130,12 @@ def set_rate(
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
-    """Say how many frames a second clips of an MCZ file have whose source does not say it (AMC).
+    """Set the frame rate of clips of an MCZ file whose source states none (AMC).
 
-    ``names``: of these clips, ``where``: of those that it takes, by default of all whose rate is
-    unknown. The rate stands in CLIP, so the file is rewritten, see ``delete_clips`` for ``output``;
-    the values stay what they are. Raises OptionError where the source of a clip states the rate,
-    and for another rate than a clip has, unless ``force``.
+    ``names`` and ``where`` select clips, by default all with an unknown rate. The rate is in CLIP,
+    so the file is rewritten, see ``delete_clips`` for ``output``; the values are unchanged. Raises
+    OptionError where the source of a clip states the rate, and for a change of a rate, unless
+    ``force``.
     """
     exact = frame_rate_of(rate, "rate").limit_denominator(10**6)
     if exact <= 0:
@@ -160,7 +160,7 @@ def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
     if states_rate(clip):
         stated = ", ".join(sorted(name for name, known in FORMATS.items() if known.states_rate))
         raise OptionError(
-            f"its source states the rate, as {stated} do; encode it anew", clip=clip.name
+            f"its source states the rate, as {stated} do; encode it again", clip=clip.name
         )
     if clip.frame_rate not in (None, rate) and not force:
         raise OptionError(
@@ -170,7 +170,7 @@ def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
 
 
 def _check_sources(target: Target, names: Iterable[str]) -> None:
-    """Raise ChecksumError where a source does not come back any more, which cannot be."""
+    """Raise ChecksumError for a source that is no longer restored, which cannot happen."""
     if not isinstance(target, (str, os.PathLike)):
         return
     with open(target) as file:
@@ -180,9 +180,9 @@ def _check_sources(target: Target, names: Iterable[str]) -> None:
                 raise ChecksumError("its source is not restored", clip=name)
 
 
-NAMES = ("clip", "name", "path", "file")  # columns that name the clip, the first that there is
+NAMES = ("clip", "name", "path", "file")  # columns that may name the clip, in order of preference
 DELIMITERS = ",;\t"
-FIELD = re.compile(r"\{([^{}:!.\[\]]+)(:[^{}]*)?\}")  # a column, and how wide it is
+FIELD = re.compile(r"\{([^{}:!.\[\]]+)(:[^{}]*)?\}")  # a column, and its format
 
 
 def from_table(
@@ -196,42 +196,41 @@ def from_table(
     """Read the metadata of the clips of ``file`` from a table (CSV or TSV, UTF-8, with a head).
 
     A row names its clip in a column ``clip``, ``name``, ``path`` or ``file``, or by ``match``, a
-    text with columns in braces: "{subject:0>2}_{trial:0>2}". That is a name as ``File.only_clip``
-    takes it. ``take``: the columns to take, by default all but the one with the name; each must be
-    a key of the registry or begin with ``x-``, or stand behind one: "description=What they do".
-    Empty cells say nothing. Also returns the names of rows without a clip, where ``skip_unknown``;
-    otherwise those are an OptionError, as are a clip that two rows name and a column that is no
-    key.
+    text with columns in braces: "{subject:0>2}_{trial:0>2}". Names are as in ``File.only_clip``.
+    ``take``: the columns to use, by default all except the one with the name; each must be a key of
+    the registry or begin with ``x-``, or follow one: "description=What they do". Empty cells are
+    ignored. Also returns the names of rows without a clip, if ``skip_unknown``; otherwise those are
+    an OptionError, as are a clip that two rows name and a column that is not a key.
     """
     rows = _read_rows(Path(path))
     head = list(rows[0]) if rows else []
     name_of = _namer(path, head, match)
     columns = _chosen_columns(path, head, match, take)
     known = names_of(file.clips)
-    said: dict[str, dict[str, str]] = {}
+    entries_by_clip: dict[str, dict[str, str]] = {}
     unknown: list[str] = []
     for number, row in enumerate(rows, 2):
         name = name_of(row)
-        found = known.get(name, ())
-        if len(found) > 1:
+        clip_names = known.get(name, ())
+        if len(clip_names) > 1:
             raise OptionError(
-                f"row {number}: {name!r} may be {list_some(sorted(found))}; write one of "
+                f"row {number}: {name!r} may be {list_some(sorted(clip_names))}; write one of "
                 "these, or make it of more columns with match, such as {folder}/{trial}",
                 path=path,
             )
-        if not found:
+        if not clip_names:
             unknown.append(name)
             continue
-        clip = next(iter(found))
-        if clip in said:
+        clip = next(iter(clip_names))
+        if clip in entries_by_clip:
             raise OptionError(f"two rows are about clip {clip!r}", path=path)
         cells = {key: row[column].strip() for key, column in columns.items()}
-        said[clip] = {key: text for key, text in cells.items() if text}
+        entries_by_clip[clip] = {key: text for key, text in cells.items() if text}
     if unknown and not skip_unknown:
         raise OptionError(
             f"no clip for {len(unknown)} of {len(rows)} rows: {list_some(unknown)}", path=path
         )
-    return said, unknown
+    return entries_by_clip, unknown
 
 
 def _read_rows(path: Path) -> list[dict[str, str]]:
@@ -262,7 +261,7 @@ def _read_rows(path: Path) -> list[dict[str, str]]:
 def _match_columns(match: str) -> list[str]:
     text = match.replace("{{", "").replace("}}", "")
     if set("{}") & set(FIELD.sub("", text)):
-        raise OptionError(f"match {match!r}: columns stand in braces, such as {{subject:0>2}}")
+        raise OptionError(f"match {match!r}: columns are in braces, such as {{subject:0>2}}")
     return [name for name, _ in FIELD.findall(text)]
 
 
@@ -285,7 +284,7 @@ def _namer(
     column = next((name for name in NAMES if name in head), None)
     if column is None:
         raise OptionError(
-            f"no column {', '.join(NAMES)} names the clips; say how by match, such as "
+            f"no column {', '.join(NAMES)} names the clips; give match, such as "
             "{subject}_{trial}",
             path=path,
         )
@@ -295,7 +294,6 @@ def _namer(
 def _chosen_columns(
     path: str | os.PathLike[str], head: Sequence[str], match: str | None, take: Sequence[str] | None
 ) -> dict[str, str]:
-    """The columns that are taken, by the key that each is."""
     if take is not None:
         return dict(_parse_take(path, head, text) for text in take)
     own = next((name for name in NAMES if name in head), None) if match is None else None
@@ -312,7 +310,7 @@ def _chosen_columns(
 
 
 def _parse_take(path: str | os.PathLike[str], head: Sequence[str], text: str) -> tuple[str, str]:
-    """Key and column of ``key=column``, or of a column that is called as the key."""
+    """Key and column of ``key=column``, or of a column with the name of the key."""
     key, equals, column = text.partition("=")
     if text in head:
         key, column = text, text

@@ -1,4 +1,4 @@
-"""Recovery data for an MCZ file, appended to it.
+"""Compute recovery data for an MCZ file and append them.
 
 SPEC.md, "RECV", is normative; ``mcz/container/recovery`` has the code.
 """
@@ -27,15 +27,15 @@ from mcz.files.reading.faults import recovery_chunks
 from mcz.model.text_format import brief
 
 DEFAULT = 0.05  # redundancy
-TRIES = 16  # to find the size of an index that names the chunk whose size depends on it
+TRIES = 16  # to find the size of an index that contains the size of its own chunk
 
 
 @dataclass(frozen=True, slots=True)
 class Protection:
     """Strength of recovery data: of ``n_blocks`` blocks any ``n_recovery`` may be bad.
 
-    So may ``burst`` bytes in a row, wherever they lie. ``start`` and ``stop``: the bytes of the
-    file that it is about; ``cost`` those that it takes.
+    So may a run of ``burst`` bytes anywhere. ``start`` and ``stop``: the protected bytes of the
+    file; ``cost``: size of the recovery data.
     """
 
     start: int
@@ -52,18 +52,18 @@ class Protection:
 def add_recovery(
     target: str | os.PathLike[str], redundancy: float, progress: Step | None = None
 ) -> list[Protection]:
-    """Append recovery data for what has none; returns what there is then, in file order."""
+    """Append recovery data for unprotected bytes; returns all of the file, in file order."""
     with growing(Path(target), salvage=False, force=False) as growth:
-        found = [protection_of(key.shape) for key in protections(growth.container)]
-        start, end = found[-1].stop if found else 0, growth.container.directory.end
+        protected = [protection_of(key.shape) for key in protections(growth.container)]
+        start, end = protected[-1].stop if protected else 0, growth.container.directory.end
         if start < end:
             shape = write_recovery(growth.container, growth.added, start, redundancy, progress)
-            found.append(protection_of(shape))
-    return found
+            protected.append(protection_of(shape))
+    return protected
 
 
 def protect_written(stream: BinaryIO, redundancy: float, progress: Step | None = None) -> Shape:
-    """Write recovery data behind the file that ``stream`` holds, before that gets its name."""
+    """Write recovery data after the file in ``stream``, before that gets its name."""
     stream.flush()
     container = Container(ByteSource(stream))
     with tempfile.SpooledTemporaryFile(IN_MEMORY) as added:  # the stream is read meanwhile
@@ -75,7 +75,7 @@ def protect_written(stream: BinaryIO, redundancy: float, progress: Step | None =
 
 
 def still_protect(target: str | os.PathLike[str], redundancy: float | None) -> bool:
-    """Protect what was appended to a file that was protected so before; return whether it was."""
+    """Protect bytes appended to a protected file likewise; return whether it was protected."""
     if redundancy is not None:
         add_recovery(target, redundancy)
     return redundancy is not None
@@ -88,13 +88,13 @@ def protection_of(shape: Shape) -> Protection:
 
 def protections(container: Container) -> list[Key]:
     """Keys of the RECV chunks of a file, in its order, unchecked."""
-    found = []
+    keys = []
     for chunk in recovery_chunks(container):
         packet = read_packet(container.source, chunk.payload_offset)
         if packet is None:
             raise FormatError("its first packet is damaged", where=f"chunk {chunk.label}")
-        found.append(packet[0])
-    return found
+        keys.append(packet[0])
+    return keys
 
 
 def redundancy_of(container: Container) -> float | None:
@@ -109,7 +109,7 @@ def redundancy_of(container: Container) -> float | None:
 def write_recovery(
     container: Container, added: BinaryIO, start: int, redundancy: float, step: Step | None
 ) -> Shape:
-    """Write RECV, INDX and FOOT behind the end of a file, for its bytes from ``start`` on."""
+    """Write RECV, INDX and FOOT after the end of a file, for its bytes from ``start`` on."""
     directory, end = container.directory, container.directory.end
     shape, tail = _settle(directory, start, end, redundancy)
 

@@ -1,4 +1,4 @@
-"""The streams of one joint with other values, coded as the clip was; nothing is written here."""
+"""Encode the streams of one joint with other values as the clip was; no file is written here."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ Streams = dict[tuple[int, int], tuple[bytes, ...]]  # (segment, group) -> by sto
 
 @dataclass(frozen=True, slots=True)
 class Recoded:
-    """One joint of a clip with other values, coded.
+    """One joint of a clip with other values, encoded.
 
-    ``given`` is the motion as it was asked for, ``decoded`` as a reader has it now. The sizes are
-    those of the joint's own streams.
+    ``given`` is the requested motion, ``decoded`` the result of a reader. The sizes are those of
+    the joint's own streams.
     """
 
     info: SignalInfo
@@ -42,22 +42,22 @@ class Recoded:
     decoded: Motion
     source: MemorySource
 
-    def beside(self, start: int, stop: int) -> tuple[dict[int, bytes], dict[int, bytes]]:
+    def side_data(self, start: int, stop: int) -> tuple[dict[int, bytes], dict[int, bytes]]:
         """Group notes and masks of the joint's groups for the segment start <= f < stop."""
         if self.info.codec.domain == "ordinals":
-            self.source.ordinals(start, stop)  # finds the exceptions
-        found = self.source.group_notes(start, stop), self.source.masks(start, stop)
+            self.source.ordinals(start, stop)  # computes the exceptions
+        notes_and_masks = self.source.group_notes(start, stop), self.source.masks(start, stop)
         notes, masks = (
             {group: streams[group] if streams else b"" for group in self.groups}
-            for streams in found
+            for streams in notes_and_masks
         )
         return notes, masks
 
 
 def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Recoded:
-    """Code the joint anew, and decode it again.
+    """Encode the joint again, and decode it.
 
-    Raises OptionError for what cannot be edited, MotionError for values that do not suit.
+    Raises OptionError for a joint that cannot be edited, MotionError for bad values.
     """
     info = clip.signals[0]
     groups = _own_groups(clip, info, joint)
@@ -91,7 +91,7 @@ def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool)
 
 @dataclass(frozen=True, slots=True)
 class Edited:
-    """A decoded clip, one joint of which has other values; ``given`` are these as they came."""
+    """A decoded clip, one joint of which has other values; ``given`` are the requested ones."""
 
     joint: int
     motion: Motion
@@ -99,7 +99,7 @@ class Edited:
 
 
 def edit(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Edited:
-    """A clip with other values for one joint; raises as ``recode_joint`` does."""
+    """A clip with other values for one joint; raises as ``recode_joint``."""
     index = _check_editable(clip, joint)
     columns = list(clip.skeleton.columns(index))
     before = clip.motion()
@@ -129,13 +129,13 @@ def is_coded_with_others(clip: Clip, joint: int | str) -> bool:
 
 
 def _own_groups(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...]:
-    """The joint's groups, which hold no channel of another joint."""
+    """The joint's groups, which contain no channel of another joint."""
     groups, mixed = groups_of(clip, (_check_editable(clip, joint),))
     if mixed is not None:
         text = f"replaced alone, codec {info.codec.name} codes its channels"
         raise coded_together(clip, *mixed, text)
     if info.codec.recode is None:
-        raise OptionError(f"codec {info.codec.name} cannot code one joint anew")
+        raise OptionError(f"codec {info.codec.name} cannot encode one joint again")
     return groups
 
 
@@ -155,7 +155,7 @@ def _check_values(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDAr
 def _edit_signal(
     clip: Clip, before: Motion, columns: Sequence[int], given: NDArray[np.float64], on_grid: bool
 ) -> Signal:
-    """The motion signal with the new values; NaN is invalid, what lies beneath stays."""
+    """The motion signal with the new values; NaN is invalid and keeps the old value."""
     old = before.signals[0]
     valid = ~np.isnan(given)
     was_valid = np.ones(old.values.shape, np.bool_) if old.mask is None else old.mask
@@ -185,7 +185,6 @@ def _edit_signal(
 
 
 def _place_on_grids(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
-    """The signal, its new values on their grids where that is wanted or must be."""
     ordinals, exact = signal.to_ordinals()
     changed = signal.values.view(np.int64) != old.values.view(np.int64)
     stray = changed & ~exact
@@ -204,10 +203,10 @@ def _place_on_grids(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> S
         )
         if not on_grid:
             raise MotionError(f"{what}; on_grid takes the nearest that it holds")
-        found = ordinals[rows][:, columns]
-        nearest = grid.values(found)
+        placed = ordinals[rows][:, columns]
+        nearest = grid.values(placed)
         given = values[rows][:, columns]
-        beyond = (np.abs(found) >= grid.limit) | ~np.isfinite(nearest) | ~np.isfinite(given)
+        beyond = (np.abs(placed) >= grid.limit) | ~np.isfinite(nearest) | ~np.isfinite(given)
         if (beyond & block).any():
             raise MotionError(f"{what}, nor one that is near")
         values[rows, columns] = np.where(block, nearest, given)
@@ -215,7 +214,7 @@ def _place_on_grids(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> S
 
 
 def _codec_source(clip: Clip, info: SignalInfo, signal: Signal) -> MemorySource:
-    """Source for the codec: all stored frames, of which ``signal`` has those shown."""
+    """Source for the codec: all stored frames, with ``signal`` as the shown ones."""
     if info.skip or info.spare:
         signal = _with_hidden(clip, info, signal)
     motion = Motion(clip.skeleton, (signal,), name=clip.name)
@@ -225,9 +224,9 @@ def _codec_source(clip: Clip, info: SignalInfo, signal: Signal) -> MemorySource:
 
 
 def _with_hidden(clip: Clip, info: SignalInfo, shown: Signal) -> Signal:
-    """``shown`` among the frames that are stored and not shown.
+    """``shown`` among the stored frames that are not shown.
 
-    A lossy codec may be unable to decode those behind: there the last frame is held.
+    A lossy codec may be unable to decode the later ones: there the last frame is repeated.
     """
     per_frame, n_stored = info.layout.samples_per_frame, info.layout.n_frames
     start, stop = info.skip, n_stored - info.spare
@@ -242,7 +241,7 @@ def _with_hidden(clip: Clip, info: SignalInfo, shown: Signal) -> Signal:
     valid[rows] = True if shown.mask is None else shown.mask
     n_held = n_stored - known
     values, valid = (
-        np.concatenate([held, *([held[-per_frame:]] * n_held)]) for held in (values, valid)
+        np.concatenate([rows, *([rows[-per_frame:]] * n_held)]) for rows in (values, valid)
     )
     return replace(
         shown,
@@ -274,7 +273,7 @@ def _recode_streams(
 
 
 def recorded_options(codec: Codec, quality: Mapping[str, str]) -> Settings:
-    """The parameters of a codec as a quality record has them; what makes no sense is left out."""
+    """The parameters of a codec in a quality record, without meaningless ones."""
     aims = {target.name for target in TARGETS}
     options = codec.options({})
     for parameter in codec.parameters:
@@ -303,17 +302,17 @@ def _decode_recoded(
 
     start, stop = info.skip, info.layout.n_frames - info.spare
     request = Request(start, stop, groups)
-    found = info.codec.decode(info.header, info.layout, info.spans, request, fetch)
+    decoded = info.codec.decode(info.header, info.layout, info.spans, request, fetch)
     columns = [column for group in groups for column in info.layout.groups[group]]
     if info.codec.domain == "values":
         values = signal.values.copy()
-        values[:, columns] = found
+        values[:, columns] = decoded
         return replace(signal, values=values)
     per_frame = signal.samples_per_frame
     for span in info.spans:
         a, b = max(start, span.first), min(stop, span.stop)
-        wanted = source.ordinals(span.first, span.stop)[:, columns]
-        wanted = wanted[(a - span.first) * per_frame : (b - span.first) * per_frame]
-        if (found[(a - start) * per_frame : (b - start) * per_frame] != wanted).any():
+        ordinals = source.ordinals(span.first, span.stop)[:, columns]
+        ordinals = ordinals[(a - span.first) * per_frame : (b - span.first) * per_frame]
+        if (decoded[(a - start) * per_frame : (b - start) * per_frame] != ordinals).any():
             raise AssertionError(f"codec {info.codec.name}: the joint does not come back")
     return signal if signal.values.dtype == np.int64 else settle(signal)[1]

@@ -1,7 +1,7 @@
-"""A damaged file made whole again by its recovery data, to the byte.
+"""Restore the bytes of a damaged file from its recovery data.
 
-SPEC.md, "RECV", is normative. Blocks are looked for where they belong, and where the packets that
-were found say that bytes were inserted or cut off before them.
+SPEC.md, "RECV", is normative. Blocks are searched at their stated offsets, and at offsets shifted
+by bytes that were inserted or cut off before them, as intact packets show.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from mcz.model.types import Progress, Target
 
 MOST_SHIFTS = 16
 MOST_SETS = 4  # that may protect the same bytes
-FEW = 8  # ranges that are named
+SHOWN_RANGES = 8  # ranges that a message lists
 SLACK = BLOCK = 1 << 20
 
 
@@ -43,8 +43,8 @@ SLACK = BLOCK = 1 << 20
 class Recovery:
     """Result of a recovery: bad blocks of all, and the bytes of the file that they cover.
 
-    ``possible``: no more blocks are bad than there are recovery blocks. ``behind``: bytes behind
-    the last that is protected, taken as they are.
+    ``possible``: there are at most as many bad blocks as recovery blocks. ``behind``: bytes after
+    the last protected one, copied unchanged.
     """
 
     n_blocks: int = 0
@@ -57,27 +57,29 @@ class Recovery:
 
     __repr__ = brief
 
-    def told(self) -> list[str]:
+    def lines(self) -> list[str]:
         """Lines on bad blocks; none for an intact file."""
         if not (self.bad_blocks or self.bad_recovery):
             return []
         of = f"{self.bad_blocks:,} of {self.n_blocks:,} blocks are bad"
         can = f"of {self.n_recovery:,} recovery blocks {self.bad_recovery:,} are bad, too"
         ranges = merged_ranges(self.bad_bytes)
-        places = ", ".join(f"{start:,} to {stop:,}" for start, stop in ranges[:FEW])
-        more = f" and {len(ranges) - FEW:,} more ranges" if len(ranges) > FEW else ""
+        places = ", ".join(f"{start:,} to {stop:,}" for start, stop in ranges[:SHOWN_RANGES])
+        more = (
+            f" and {len(ranges) - SHOWN_RANGES:,} more ranges" if len(ranges) > SHOWN_RANGES else ""
+        )
         where = [f"bytes {places}{more}"] if ranges else []
         return [f"recovery data: {of}; {can}", *where]
 
 
 @dataclass(slots=True)
 class _RecoverySet:
-    """One RECV as far as it was found, and where its blocks are."""
+    """One RECV as far as it was found, and the places of its blocks."""
 
     key: Key
     sections: dict[int, bytes] = field(default_factory=dict)
-    blocks: dict[int, int] = field(default_factory=dict)  # where their bodies lie
-    shifts: dict[int, None] = field(default_factory=dict)  # in the order of being found
+    blocks: dict[int, int] = field(default_factory=dict)  # offsets of their bodies
+    shifts: dict[int, None] = field(default_factory=dict)  # in the order of discovery
 
     @property
     def shape(self) -> Shape:
@@ -92,19 +94,19 @@ class _RecoverySet:
 def recovery_sets(source: ByteSource) -> dict[int, list[_RecoverySet]]:
     """The recovery data left in a file, by the offset of the range that they protect.
 
-    A file may hold some of other files, whole ones that were attached or put behind it: those
-    whose packets lie where they belong come first, and few of the others count.
+    A file may contain recovery data of other files, which were attached or appended whole: sets
+    whose packets lie at their places come first, and few of the others count.
     """
-    found: dict[Key, _RecoverySet] = {}
+    by_key: dict[Key, _RecoverySet] = {}
     places: dict[Key, dict[tuple[int, int], int]] = {}
     for key, packet in find_packets(source):
         if key.shape.stop > 2 * source.size + SLACK:
             continue  # more than half of the file is gone, or it never was its own
-        one = found.setdefault(key, _RecoverySet(key))
+        one = by_key.setdefault(key, _RecoverySet(key))
         place = places.setdefault(key, {(k, i): at for k, i, at in key.shape.packets()})
         _keep_packet(one, packet, place.get((packet.kind, packet.index)))
     starts: dict[int, list[_RecoverySet]] = {}
-    for one in sorted(found.values(), key=lambda one: (one.distance, -len(one.blocks))):
+    for one in sorted(by_key.values(), key=lambda one: (one.distance, -len(one.blocks))):
         starts.setdefault(one.shape.start, []).append(one)
     return {start: sets[:MOST_SETS] for start, sets in starts.items()}
 
@@ -123,7 +125,7 @@ def _keep_packet(one: _RecoverySet, packet: Packet, place: int | None) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """One RECV, and of each data block that is there by how much its pieces are shifted."""
+    """One RECV, and of each intact data block the shifts of its pieces."""
 
     set: _RecoverySet
     there: dict[int, tuple[int, ...]]
@@ -134,17 +136,17 @@ class Examined:
 
     @property
     def is_possible(self) -> bool:
-        """True if what is bad can be computed: no more blocks than there are recovery blocks."""
+        """True if the bad blocks can be computed: at most as many as recovery blocks."""
         return self.n_bad <= len(self.set.blocks)
 
     @property
     def shift(self) -> int:
-        """By how much the end of what is protected is shifted, as far as it is known."""
+        """The shift of the end of the protected range, as far as it is known."""
         return self.there[max(self.there)][-1] if self.there else 0
 
 
 def _examine_set(source: ByteSource, one: _RecoverySet) -> Examined:
-    """Find the data blocks; those that are not there are bad."""
+    """Find the data blocks; missing ones are bad."""
     shape = one.shape
     table = _read_table(one)
     there: dict[int, tuple[int, ...]] = {}
@@ -152,14 +154,14 @@ def _examine_set(source: ByteSource, one: _RecoverySet) -> Examined:
     hint = 0
     for block in range(shape.n_blocks):
         pieces = shape.pieces(block)
-        wanted = None if table is None else table[HASH * block : HASH * (block + 1)]
+        block_hash = None if table is None else table[HASH * block : HASH * (block + 1)]
         order = dict.fromkeys([hint, *shifts])
         for tried in product(order, repeat=len(pieces)):
             data = _read(source, pieces, tried)
             if data is None:
                 continue
             padded = data.ljust(shape.block_size, b"\0")
-            if wanted is None or short_hash(padded) == wanted:
+            if block_hash is None or short_hash(padded) == block_hash:
                 there[block] = tried
                 hint = tried[0]
                 break
@@ -179,7 +181,7 @@ def _read(
 
 
 def _read_table(one: _RecoverySet) -> bytes | None:
-    """The hashes of the blocks; None where too few sections are left."""
+    """The hashes of the blocks; None if too few sections are left."""
     shape = one.shape
     n, size = shape.n_sections, shape.section_size
     lost = [index for index in range(n) if index not in one.sections]
@@ -199,13 +201,13 @@ def _read_table(one: _RecoverySet) -> bytes | None:
 
 
 class Restorer:
-    """Writes a file as it was protected to ``out``, which can be read again."""
+    """Writes a file as it was protected to ``out``, which can be read back."""
 
     def __init__(self, source: ByteSource, out: BinaryIO, step: Step | None) -> None:
         self.source, self.out, self.step = source, out, step
 
     def restore(self, one: _RecoverySet, there: dict[int, tuple[int, ...]]) -> None:
-        """Write what one RECV protects, and itself; raises FormatError where it is not that."""
+        """Write the range of one RECV, and the RECV; raises FormatError for a wrong result."""
         shape = one.shape
         for block, shifts in there.items():
             data = _read(self.source, shape.pieces(block), shifts)
@@ -215,7 +217,7 @@ class Restorer:
         self._write_recv(one)
 
     def _write(self, shape: Shape, block: int, data: bytes, first: int = 0) -> None:
-        """Write what a block has from its byte ``first`` on; the padding is no part of the file."""
+        """Write a block from its byte ``first`` on, without padding."""
         at, stop = 0, first + len(data)
         for offset, size in shape.pieces(block):
             begin, end = max(first, at), min(stop, at + size)
@@ -239,12 +241,12 @@ class Restorer:
             for at, row in enumerate(rows):
                 place = one.blocks[row] + LANE * start
                 rest[at] ^= np.frombuffer(self.source.read(place, rest[at].nbytes), "<i8")
-            found = recover_blocks(rest, lost, rows, shape.n_recovery).astype("<i8")
+            blocks = recover_blocks(rest, lost, rows, shape.n_recovery).astype("<i8")
             for at, block in enumerate(lost):
-                self._write(shape, block, found[at].tobytes(), LANE * start)
+                self._write(shape, block, blocks[at].tobytes(), LANE * start)
 
     def _write_recv(self, one: _RecoverySet) -> None:
-        """The RECV chunk, made anew of what was written around it; raises NotThatError."""
+        """The RECV chunk, computed again from the written range; raises NotThatError."""
         shape = one.shape
 
         def read(offset: int, size: int) -> bytes:
@@ -253,15 +255,15 @@ class Restorer:
 
         key, packets = encode_packets(shape, lambda block: shape.block(block, read), self.step)
         if key != one.key:
-            raise NotThatError("what recovery data give is not what they were made of")
+            raise NotThatError("the recovered bytes are not the protected ones")
         at = shape.chunk_offset
         for data in chunk_bytes(shape, packets):  # which reads meanwhile
             self.out.seek(at)
             self.out.write(data)
             at += len(data)
 
-    def rest(self, last: _RecoverySet, size: int) -> None:
-        """Copy the bytes behind all protected ones."""
+    def copy_unprotected(self, last: _RecoverySet, size: int) -> None:
+        """Copy the bytes after all protected ones."""
         stop = self.source.size
         self.out.seek(last.shape.stop)
         for at in range(stop - size, stop, BLOCK):
@@ -278,18 +280,18 @@ def examine(source: ByteSource) -> tuple[Recovery, list[Examined]]:
         every = chain_from((fallback,), tried)
         chain.append(next((one for one in every if one.is_possible), fallback))
         at = chain[-1].set.shape.stop
-    found = Recovery(possible=all(one.is_possible for one in chain))
+    recovery = Recovery(possible=all(one.is_possible for one in chain))
     for one in chain:
         shape = one.set.shape
-        found.n_blocks += shape.n_blocks
-        found.n_recovery += shape.n_recovery
-        found.bad_blocks += one.n_bad
-        found.bad_recovery += shape.n_recovery - len(one.set.blocks)
+        recovery.n_blocks += shape.n_blocks
+        recovery.n_recovery += shape.n_recovery
+        recovery.bad_blocks += one.n_bad
+        recovery.bad_recovery += shape.n_recovery - len(one.set.blocks)
         bad = (block for block in range(shape.n_blocks) if block not in one.there)
-        found.bad_bytes += [(at, at + size) for block in bad for at, size in shape.pieces(block)]
+        recovery.bad_bytes += [(at, at + size) for block in bad for at, size in shape.pieces(block)]
     if chain:
-        found.behind = _bytes_behind(source, chain[-1])
-    return found, chain
+        recovery.behind = _bytes_behind(source, chain[-1])
+    return recovery, chain
 
 
 def _bytes_behind(source: ByteSource, last: Examined) -> int:
@@ -312,28 +314,28 @@ def check_recovery(target: Target) -> Recovery | None:
 def recover(
     source: ByteSource, out: BinaryIO, progress: Progress | None
 ) -> tuple[Recovery | None, int]:
-    """Write the file as it was protected to ``out``, which can be read again, as far as possible.
+    """Write the file as it was protected to ``out``, which can be read back, as far as possible.
 
-    Also returns where that ends; what lies behind is in ``out`` as it was. Zero, and nothing is
-    written, where nothing can be restored; no Recovery where there are no recovery data.
+    Also returns the end of that part; later bytes are copied unchanged. Zero, and nothing is
+    written, if nothing can be restored; no Recovery without recovery data.
     """
-    found, sets = examine(source)
+    recovery, sets = examine(source)
     restorer = Restorer(source, out, None if progress is None else _steps(progress))
     done: Examined | None = None
     for one in takewhile(lambda one: one.is_possible, sets):
         try:
             restorer.restore(one.set, one.there)
         except NotThatError:
-            found.possible = False
+            recovery.possible = False
             break
         done = one
     if done is None:
         out.seek(0)
         out.truncate()
-        return (found if sets else None), 0
-    restorer.rest(done.set, _bytes_behind(source, done))
+        return (recovery if sets else None), 0
+    restorer.copy_unprotected(done.set, _bytes_behind(source, done))
     out.flush()
-    return found, done.set.shape.stop
+    return recovery, done.set.shape.stop
 
 
 class NotThatError(FormatError):

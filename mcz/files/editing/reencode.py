@@ -1,7 +1,7 @@
-"""Clips that cannot be cut as they are stored, decoded and coded anew where a caller allows it.
+"""Decode and re-encode clips that cannot be cut as stored, if the caller allows it.
 
-``extraction.py`` and ``replacing.py`` ask for it; SPEC.md, "Cutting without re-encoding" and
-"Replacing a joint", says what they note of it.
+``extraction.py`` and ``replacing.py`` use it; SPEC.md, "Cutting without re-encoding" and "Replacing
+a joint", define their notes.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from mcz.model.motion import Motion, Signal
 from mcz.model.types import Settings
 from mcz.sources import FORMATS
 
-OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may not be there
+OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may be missing
 
 
 def check_anew(clip: Clip, *, whole: bool = False) -> None:
-    """Raise OptionError for a clip that cannot be coded anew as it was; ``whole``: all joints."""
+    """Raise OptionError for a clip that cannot be encoded again; ``whole``: all joints."""
     info = clip.signals[0]
     if info.exact and not (whole and "param.lossless" in (clip.quality or {})):
         raise OptionError(
@@ -31,22 +31,22 @@ def check_anew(clip: Clip, *, whole: bool = False) -> None:
         )
     if not info.codec.lossless and (clip.quality or {}).get("codec") != info.codec.name:
         raise OptionError(
-            "no quality record says how it was coded; decode it and encode it anew", clip=clip.name
+            "no quality record states its settings; decode it and encode it again", clip=clip.name
         )
 
 
 def settings_of(clip: Clip) -> Settings:
-    """The settings that a clip was coded with and that are not what they are by default."""
+    """The settings of a clip that differ from the defaults."""
     codec = clip.signals[0].codec
     usual = codec.options({})
-    found = recorded_options(codec, clip.quality or {})
+    settings = recorded_options(codec, clip.quality or {})
     if codec.promise:
-        found.pop("preset", None)  # the setting of the dial is what came of it
-    return {name: value for name, value in found.items() if value != usual[name]}
+        settings.pop("preset", None)  # the setting of the dial is its result
+    return {name: value for name, value in settings.items() if value != usual[name]}
 
 
 def with_own_source(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
-    """The rest of ``clip`` with a source of its own values, or none and the reason for that."""
+    """The rest of ``clip`` with a source of its own values, or without one and the reason."""
     motion = stating_rate(motion, clip.frame_numbers)
     if motion.source is None:
         return motion, None
@@ -63,7 +63,6 @@ def with_own_source(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
 
 
 def _on_binary_grids(signal: Signal) -> Signal:
-    """The signal with values that a source of binary numbers holds, the nearest to its own."""
     if all(grid.is_text for _, _, grid in signal.grid_blocks()):
         return signal
     ordinals, exact = signal.to_ordinals()
@@ -77,7 +76,7 @@ def _on_binary_grids(signal: Signal) -> Signal:
 
 
 def joints_alone(cut: ClipCut) -> Motion:
-    """Decode the joints of a cut: other joints have no channels, and the source is gone."""
+    """Decode the joints of a cut: other joints have no channels, and there is no source."""
     motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
     if cut.joints is None:
         return motion
@@ -113,6 +112,6 @@ def joints_alone(cut: ClipCut) -> Motion:
 def settings_of_joints(clip: Clip) -> Settings:
     """The settings of a clip that suit some of its joints alone."""
     codec = clip.signals[0].codec
-    found = {k: v for k, v in settings_of(clip).items() if k not in OF_JOINTS}
-    # Positions of points stay what they are: with fewer of them, positions were found again.
-    return found | {"domain": "channels"} if codec.has("domain") else found
+    settings = {k: v for k, v in settings_of(clip).items() if k not in OF_JOINTS}
+    # Point positions of the base are kept: with fewer joints they would be derived again.
+    return settings | {"domain": "channels"} if codec.has("domain") else settings

@@ -1,7 +1,7 @@
-"""Clips taken out of a file, renamed, put in another order, or spread over several files.
+"""Clips deleted, renamed, reordered, or split over several files, without re-encoding.
 
-Nothing is coded anew (``rewriting.py``). What is deleted is in no byte of the new file, nor is what
-was there for its sake alone: skeletons, templates, models, what is said of it.
+The new file contains no byte of deleted clips, nor of skeletons, templates, models and metadata
+that only they used. ``rewriting.py`` copies the rest.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.errors import ExistsError, OptionError
 from mcz.files.editing.batch_report import Outcome, Report
-from mcz.files.editing.chunk_copier import SAME, Change
+from mcz.files.editing.chunk_copier import UNCHANGED, Change
 from mcz.files.editing.rewriting import (
     ALIAS,
     ATTACHMENT,
@@ -58,14 +58,13 @@ def delete_clips(
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
-    """Take clips, attachments and aliases out of an MCZ file, and their bytes with them.
+    """Delete clips, attachments and aliases from an MCZ file, including their bytes.
 
-    ``names``: those of clips, attachments or aliases; ``where``: also the clips that it takes, see
-    ``File.find``. What only they needed goes, too: skeletons and the files of these, templates,
-    models. A further name of the same content would keep it: with ``aliases`` it is deleted as
-    well, without it is refused. ``output``: the new file, for which ``force`` is; None: it takes
-    the place of the old one once it is whole. Raises OptionError for a name that is not there, and
-    where nothing is named.
+    ``names``: clips, attachments or aliases; ``where``: also the clips that match it, see
+    ``File.find``. Skeletons and their files, templates and models that only they need are deleted
+    too. An alias of the same content would keep it: with ``aliases`` it is deleted as well, without
+    it is refused. ``output``: the new file, to which ``force`` applies; None: it replaces the old
+    one once it is complete. Raises OptionError for an unknown name, and without any.
     """
     with rewriting(target, output, force=force) as job:
         file = job.file
@@ -89,7 +88,7 @@ def delete_clips(
         for thing in things_in(file):
             if thing not in plan.things:  # with the clips that had the skeleton
                 what.setdefault(thing, "the file of a skeleton that no other clip has")
-        report = Report([Outcome(name, "deleted", 0, said) for (_, name), said in what.items()])
+        report = Report([Outcome(name, "deleted", 0, reason) for (_, name), reason in what.items()])
         return _finish(job, plan, report, progress)
 
 
@@ -104,15 +103,15 @@ def _find_thing(file: File, name: str) -> Thing:
     if clips:
         raise OptionError(f"{name!r} may be {list_some(clips)}; choose one", path=file.name)
     near = nearest(name, [other for _, other in things_in(file)])
-    said = f"; did you mean {near}?" if near else ""
-    raise OptionError(f"nothing is called {name!r}{said}", path=file.name)
+    suggestion = f"; did you mean {near}?" if near else ""
+    raise OptionError(f"nothing is called {name!r}{suggestion}", path=file.name)
 
 
 def _plan_without(file: File, gone: Collection[Thing]) -> Plan:
     """Plan a file without ``gone`` and without anything that only these need."""
     plan = plan_whole(file)
-    plan.things = {thing: SAME for thing in plan.things if thing not in gone}
-    needed = used_by(file, plan.of(CLIP))
+    plan.things = {thing: UNCHANGED for thing in plan.things if thing not in gone}
+    needed = used_by(file, plan.things_of(CLIP))
     lost = used_by(file, [name for kind, name in gone if kind == CLIP])
     of_skeleton = {
         alias: (ChunkType.SKEL, target)
@@ -140,13 +139,12 @@ def rename_clips(
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
-    """Call clips, attachments and aliases of an MCZ file otherwise.
+    """Rename clips, attachments and aliases of an MCZ file.
 
-    ``names``: from the old ones to the new. A clip's source, whose path was the clip's name and a
-    suffix, follows it, so that ``unpack`` gives it under the new name; so do what is said of it
-    and its aliases, which keep their own names. Names may be swapped. ``output`` and ``force`` are
-    those of ``delete_clips``. Raises OptionError for a name that is not there, and for one that is
-    taken.
+    ``names``: from old to new ones. A clip's source whose path is the clip's name and a suffix is
+    renamed too, so that ``unpack`` writes it under the new name; metadata and aliases, which keep
+    their own names, follow the clip. Names may be swapped. ``output`` and ``force`` are as in
+    ``delete_clips``. Raises OptionError for an unknown name, and for one that is in use.
     """
     with rewriting(target, output, force=force) as job:
         file, report = job.file, Report()
@@ -168,7 +166,7 @@ def _rename_change(file: File, thing: Thing, new: str) -> Change:
 
 
 def _refuse_equal(file: File, plan: Plan) -> None:
-    """Raise OptionError where two things would have one name that have not got one now."""
+    """Raise OptionError for two things that would newly have one name."""
     names = Counter((kind, change.name or name) for (kind, name), change in plan.things.items())
     for (kind, name), number in names.items():
         if number > 1:
@@ -192,21 +190,21 @@ def reorder_clips(
 ) -> Report:
     """Put the clips of an MCZ file in another order.
 
-    Those called ``names`` come first, in this order; the others follow in the order that they had
-    or, with ``by``, sorted by a field or metadata key ("-n_frames": descending), those without it
-    last. Names are sorted as people do: "take2" before "take10". ``output`` and ``force`` are
-    those of ``delete_clips``.
+    Clips in ``names`` come first, in this order; the others follow in their old order or, with
+    ``by``, sorted by a field or metadata key ("-n_frames": descending), those without it last.
+    Names are sorted with numbers as numbers: "take2" before "take10". ``output`` and ``force`` are
+    as in ``delete_clips``.
     """
     if isinstance(names, str):
         names = [names]
     if not names and by is None:
-        raise OptionError("no order: name clips, or say by what they are sorted")
+        raise OptionError("no order: name clips, or give a key to sort by")
     with rewriting(target, output, force=force) as job:
         file = job.file
         rest = list(file) if by is None else in_order(file, list(file), by)
         clips = dict.fromkeys((CLIP, clip.name) for clip in (*file.clips_called(names), *rest))
         plan = plan_whole(file)
-        plan.things = dict.fromkeys([*clips, *plan.things], SAME)
+        plan.things = dict.fromkeys([*clips, *plan.things], UNCHANGED)
         report = Report([Outcome(name, "moved") for _, name in clips])
         return _finish(job, plan, report, progress)
 
@@ -214,17 +212,17 @@ def reorder_clips(
 def in_order(file: File, clips: Sequence[Clip], by: str) -> list[Clip]:
     """``clips`` sorted by a field or metadata key, "-" before it: descending; those without last.
 
-    Raises OptionError for a name that is neither.
+    Raises OptionError for an unknown name.
     """
     get = getter_of(by.removeprefix("-"), file.clips.values())
-    found = [(get(clip), clip) for clip in clips]
-    having = [(value, clip) for value, clip in found if value is not None]
+    keyed = [(get(clip), clip) for clip in clips]
+    having = [(value, clip) for value, clip in keyed if value is not None]
     having.sort(key=lambda pair: natural(pair[0]), reverse=by.startswith("-"))
-    return [clip for _, clip in having] + [clip for value, clip in found if value is None]
+    return [clip for _, clip in having] + [clip for value, clip in keyed if value is None]
 
 
 def natural(value: Value) -> tuple[object, ...]:
-    """Sort key that takes numbers within texts as numbers: "take2" before "take10"."""
+    """Sort key with numbers within texts as numbers: "take2" before "take10"."""
     if isinstance(value, str):
         parts = re.split(r"([0-9]+)", value)
         return 1, [(int(part), part) if part.isdigit() else (-1, part.casefold()) for part in parts]
@@ -240,12 +238,12 @@ def split(
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
-    """Spread the clips of an MCZ file over files below ``directory``, one for each value of ``by``.
+    """Split the clips of an MCZ file over files below ``directory``, one for each value of ``by``.
 
-    ``by``: a field or metadata key, or "folder", the first part of the clips' names. Each file is
-    called like the value and has the skeletons, templates and aliases of its clips. Clips without
-    a value, attachments, and skeletons that no clip has, are for the file called ``rest``; without
-    it an OptionError says that there are some. ``target`` stays as it is.
+    ``by``: a field or metadata key, or "folder", the first part of the clips' names. Each file has
+    the value as its name, with the skeletons, templates and aliases of its clips. Clips without a
+    value, attachments, and skeletons without a clip go to the file called ``rest``; without it they
+    are an OptionError. ``target`` does not change.
     """
     folder, report = Path(directory), Report()
     with open(target) as file:
@@ -260,8 +258,8 @@ def split(
         for value, names in groups.items():
             plan, part = _plan_part(file, names, with_rest=value == rest), Report()
             Rewriting(target, outputs[value], force, file).write(plan, part, step)
-            said = counted(len(names), "clip")
-            report.outcomes.append(Outcome(str(outputs[value]), "written", part.size or 0, said))
+            message = counted(len(names), "clip")
+            report.outcomes.append(Outcome(str(outputs[value]), "written", part.size or 0, message))
     return report
 
 
@@ -282,9 +280,9 @@ def _group_clips(file: File, by: str, rest: str | None) -> dict[str, list[str]]:
     elif without or file.attachments or others:
         left = [(len(without), "clip"), (len(file.attachments), "attachment")]
         left.append((sum(kind == ChunkType.SKEL for kind, _ in others), "skeleton"))
-        said = ", ".join(counted(n, word) for n, word in left if n)
-        if said:
-            raise OptionError(f"{said} without {by}; name a file for the rest", path=file.name)
+        text = ", ".join(counted(n, word) for n, word in left if n)
+        if text:
+            raise OptionError(f"{text} without {by}; name a file for the rest", path=file.name)
     return groups
 
 
@@ -297,21 +295,21 @@ def _text(value: Value) -> str:
 
 
 def _plan_part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
-    """Plan the file of these clips; ``with_rest``: with all that is no clip's."""
+    """Plan the file of these clips; ``with_rest``: with everything outside of clips."""
     needed = used_by(file, names)
     if with_rest:
         needed |= set(file.container.directory.shared) - used_by(file, file.clips)
     shared = [key for key in file.container.directory.shared if key in needed]
-    plan = Plan(dict.fromkeys(((CLIP, name) for name in names), SAME), shared)
+    plan = Plan(dict.fromkeys(((CLIP, name) for name in names), UNCHANGED), shared)
     if with_rest:
-        plan.things |= dict.fromkeys(((ATTACHMENT, name) for name in file.attachments), SAME)
+        plan.things |= dict.fromkeys(((ATTACHMENT, name) for name in file.attachments), UNCHANGED)
     kept = {*plan.things}
     kept |= {(SKELETON, id_.hex()) for kind, id_ in shared if kind == ChunkType.SKEL}
     others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in kept]
-    plan.things |= dict.fromkeys(others, SAME)
+    plan.things |= dict.fromkeys(others, UNCHANGED)
     return plan
 
 
 def _finish(job: Rewriting, plan: Plan, report: Report, progress: Progress | None) -> Report:
-    job.write(plan, report, steps(progress, len(plan.of(CLIP))))
+    job.write(plan, report, steps(progress, len(plan.things_of(CLIP))))
     return report

@@ -1,8 +1,8 @@
-"""``repair``: a damaged file made what it was, or a sound file of all that is whole in it.
+"""``repair``: restore a damaged file, or write a valid file of its intact parts.
 
-``recovering.py`` undoes damage by recovery data: the result counts only where it opens, and holds
-all that the damaged file still does. Otherwise stored bytes are copied, never coded anew: each run
-of frames that can still be decoded becomes a clip. SPEC.md, "Salvage" and "Cutting without
+``recovering.py`` restores bytes from recovery data; its result counts only if it opens, and has
+every part that the damaged file still has. Otherwise stored bytes are copied, never encoded again:
+each run of frames that can still be decoded becomes a clip. SPEC.md, "Salvage" and "Cutting without
 re-encoding", are normative.
 """
 
@@ -30,7 +30,7 @@ from mcz.files.editing.extraction import Copying
 from mcz.files.editing.recovering import recover
 from mcz.files.editing.salvage_copier import (
     FULL,
-    NOTHING,
+    NO_PART,
     Repairer,
     Run,
     SomeSignals,
@@ -57,15 +57,15 @@ def repair(
     max_decoded: int | None = None,
     progress: Progress | None = None,
 ) -> Repair:
-    """Write a sound MCZ file of all that is whole in the damaged file ``source`` to ``target``.
+    """Write a valid MCZ file of the intact parts of the damaged file ``source`` to ``target``.
 
-    Whole clips, skeletons and attachments are copied as they are. Of another clip the runs of
-    frames that can be decoded are clips called ``NAME.A-B``, with sources of these frames, or keep
-    its name where no frame is lost. What was written is read again, strictly, before it gets its
-    name. Raises FormatError where nothing is whole.
+    Intact clips, skeletons and attachments are copied unchanged. Runs of frames of other clips that
+    can be decoded become clips ``NAME.A-B``, with sources of these frames, or keep the name if no
+    frame is lost. The new file is read again, strictly, before it gets its name. Raises FormatError
+    if nothing is intact.
 
-    A file with recovery data (``mcz.protect``) is first made what it was, byte for byte: what is
-    above happens only where more of it is bad than they can restore, and to what was put behind it.
+    A file with recovery data (``mcz.protect``) is first restored byte for byte: the above applies
+    only if more of it is bad than they can restore, and to bytes appended after it.
     """
     data = open_bytes(source)
     try:
@@ -91,29 +91,29 @@ def _refuse_same(source: ByteSource, target: Target) -> None:
 def _repair_to(
     source: ByteSource, out: BinaryIO, max_decoded: int | None, progress: Progress | None
 ) -> Repair:
-    found = Repair()
-    found.recovery, stop = recover(source, out, progress)
-    if found.recovery is not None:
-        found.damage += found.recovery.told()
-    wanted = _content(source) if stop else Content()
-    if stop and found.recovery is not None and found.recovery.possible:
-        size = _size_of_whole(out, stop, wanted, found)
+    outcome = Repair()
+    outcome.recovery, stop = recover(source, out, progress)
+    if outcome.recovery is not None:
+        outcome.damage += outcome.recovery.lines()
+    required = _content(source) if stop else Content()
+    if stop and outcome.recovery is not None and outcome.recovery.possible:
+        size = _size_of_whole(out, stop, required, outcome)
         if size:
             out.truncate(size)
-            return _as_it_was(out, found, max_decoded)
+            return _as_it_was(out, outcome, max_decoded)
     with tempfile.TemporaryFile() as spool:
         better = _move_to(out, spool, source.name) if stop else source
-        if not wanted <= _content(better):  # it was made of another file
+        if not required <= _content(better):  # it belongs to another file
             better = source
         file = file_of(Container(better, salvage=True, max_decoded=max_decoded))
-        return write_whole(file, out, found, progress)
+        return write_whole(file, out, outcome, progress)
 
 
-def _size_of_whole(out: BinaryIO, stop: int, wanted: Content, found: Repair) -> int:
-    """The number of bytes in ``out`` that are a sound file with all that is ``wanted``.
+def _size_of_whole(out: BinaryIO, stop: int, required: Content, outcome: Repair) -> int:
+    """The number of bytes in ``out`` that are a valid file with everything in ``required``.
 
-    Those behind ``stop``, where what was protected ends, count where they belong to it. Zero where
-    there is no such file.
+    Bytes after ``stop``, the end of the protected part, count if they belong to it. Zero if there
+    is no such file.
     """
     size = out.seek(0, os.SEEK_END)
     for end in dict.fromkeys((size, stop)):
@@ -123,16 +123,16 @@ def _size_of_whole(out: BinaryIO, stop: int, wanted: Content, found: Repair) -> 
             scan(whole, whole=True)
         except FormatError:
             continue
-        if not (wanted | _content(ByteSource(out, size=size))) <= _content(whole):
+        if not (required | _content(ByteSource(out, size=size))) <= _content(whole):
             return 0
         if end < size:
-            found.damage.append(f"{size - end:,} bytes behind its end are no part of the file")
+            outcome.damage.append(f"{size - end:,} bytes behind its end are no part of the file")
         return end
     return 0
 
 
 def _content(source: ByteSource) -> Content:
-    """The whole content of a file, so that two files can be compared."""
+    """The intact content of a file, so that two files can be compared."""
     try:
         container = Container(source, salvage=True)
     except MczError:
@@ -142,15 +142,17 @@ def _content(source: ByteSource) -> Content:
     def mark(chunk: Chunk) -> bytes:
         return container.source.read(chunk.offset + chunk.size - CRC.size, CRC.size)
 
-    found: Content = {("skeleton", id_) for kind, id_ in directory.shared if kind == ChunkType.SKEL}
-    found |= {("alias", name, *alias) for name, alias in directory.aliases.items()}
+    content: Content = {
+        ("skeleton", id_) for kind, id_ in directory.shared if kind == ChunkType.SKEL
+    }
+    content |= {("alias", name, *alias) for name, alias in directory.aliases.items()}
     for name, row in directory.clips.items():
-        found.add(("clip", name, mark(row.clip)))
+        content.add(("clip", name, mark(row.clip)))
         if row.cend is not None:
-            found.add(("end", name, mark(row.cend)))
-    for name, held in directory.attachments.items():
-        found |= {("attachment", name, mark(part)) for part in held.parts}
-    return found
+            content.add(("end", name, mark(row.cend)))
+    for name, attachment in directory.attachments.items():
+        content |= {("attachment", name, mark(part)) for part in attachment.parts}
+    return content
 
 
 def _move_to(out: BinaryIO, spool: BinaryIO, name: str) -> ByteSource:
@@ -162,17 +164,17 @@ def _move_to(out: BinaryIO, spool: BinaryIO, name: str) -> ByteSource:
     return ByteSource(spool, name=name)
 
 
-def _as_it_was(out: BinaryIO, found: Repair, max_decoded: int | None) -> Repair:
+def _as_it_was(out: BinaryIO, outcome: Repair, max_decoded: int | None) -> Repair:
     file = File(Container(ByteSource(out), max_decoded=max_decoded))
-    found.damage += [f"{problem.heading}: {problem.message}" for problem in validate(file)]
-    found.clips, found.attachments = list(file.clips), list(file.attachments)
-    found.size, found.restored = file.size, True
+    outcome.damage += [f"{problem.heading}: {problem.message}" for problem in validate(file)]
+    outcome.clips, outcome.attachments = list(file.clips), list(file.attachments)
+    outcome.size, outcome.restored = file.size, True
     out.seek(0, os.SEEK_END)
-    return found
+    return outcome
 
 
 # Chunks without content of their own, or of a clip that is named.
-TOLD = (
+REPORTED = (
     ChunkType.HEAD,
     ChunkType.INDX,
     ChunkType.DATA,
@@ -182,15 +184,15 @@ TOLD = (
 )
 
 
-def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress | None) -> Repair:
-    """Write all that is whole in ``file``, opened for salvage, to ``stream``, and read it again.
+def write_whole(file: File, stream: BinaryIO, outcome: Repair, progress: Progress | None) -> Repair:
+    """Write the intact parts of ``file``, opened for salvage, to ``stream``, and read it again.
 
-    What breaks a rule there, though its checksums are right, is left out: of a clip first what
-    belongs to it, then its source, then the clip. Raises FormatError where nothing is whole.
+    Parts with right checksums that break a rule are left out: of a clip first its ancillary chunks,
+    then its source, then the clip. Raises FormatError if nothing is intact.
     """
-    damage, degrees = [*found.damage, *file.damage], dict[str, int]()
+    damage, degrees = [*outcome.damage, *file.damage], dict[str, int]()
     while True:
-        attempt = Repair(damage=list(damage), recovery=found.recovery)
+        attempt = Repair(damage=list(damage), recovery=outcome.recovery)
         repairer = Repairer(Copying(file, stream, progress), attempt, degrees)
         cuts = list(_plan_cuts(file, attempt))
         attempt.lost += _lost_things(file.container)
@@ -204,7 +206,7 @@ def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress 
         if not problems:
             return attempt
         for name in {_clip_at(repairer, problem.offset) for problem in problems}:
-            if not name or degrees.get(name, FULL) == NOTHING:
+            if not name or degrees.get(name, FULL) == NO_PART:
                 raise FormatError(f"the repaired file is not sound: {problems[0].message}")
             degrees[name] = degrees.get(name, FULL) + 1
         stream.seek(0)
@@ -212,13 +214,12 @@ def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress 
 
 
 def _clip_at(repairer: Repairer, offset: int) -> str:
-    """The clip of the new file that lies at ``offset``; "" where none does."""
+    """The clip of the new file at ``offset``; "" if there is none."""
     rows = repairer.writer.directory.clips
     return next((name for name in reversed(rows) if rows[name].clip.offset <= offset), "")
 
 
 def _lost_things(container: Container) -> Iterator[str]:
-    """Lost things, by the names that an index has for them."""
     last = max(container.feet, default=0)
     feet = (parse_foot(container.source.read(at, FOOT.size), at) for at in container.feet)
     indices = {foot.index_offset for foot in feet if foot}
@@ -228,18 +229,18 @@ def _lost_things(container: Container) -> Iterator[str]:
             name = names.get(at, f"what began at byte {at}")
             if name:
                 yield name
-        elif chunk is not None and chunk.type not in TOLD:
+        elif chunk is not None and chunk.type not in REPORTED:
             yield names.get(at, f"chunk {chunk.label}")
 
 
 def _is_foot(container: Container, at: int) -> bool:
-    """Return whether a FOOT lay there: most of the letters that end one do."""
+    """Return whether a FOOT was there: most letters of its end magic are."""
     end = container.source.read(at, min(FOOT.size, container.source.size - at))[-len(END_MAGIC) :]
     return bool(sum(map(eq, end, END_MAGIC)) > len(END_MAGIC) // 2)
 
 
 def _indexed_names(container: Container) -> dict[int, str]:
-    """The names, in a sound index, of the things at each offset; "" where that is no loss."""
+    """The names, in a valid index, of the things at each offset; "" for one that is not lost."""
     names: dict[int, str] = {}
     with suppress(FormatError):
         listed = Container(container.source).directory
@@ -251,7 +252,7 @@ def _indexed_names(container: Container) -> dict[int, str]:
             names |= {one.offset: "" for one in (*inside, clip.cend) if one is not None}
             for one in clip.ancillary:
                 text = f"clip {name!r}: its {one.type.decode()}"
-                names[one.offset] = "" if one.type in TOLD else text
+                names[one.offset] = "" if one.type in REPORTED else text
         for name, row in listed.attachments.items():
             names |= {part.offset: f"attachment {name!r}" for part in row.parts}
     return names | {len(SIGNATURE): ""}  # HEAD
@@ -269,11 +270,11 @@ def _check_output(stream: BinaryIO, size: int, max_decoded: int) -> list[Problem
         stream.seek(size)
 
 
-def _plan_cuts(file: File, found: Repair) -> Iterator[ClipCut]:
+def _plan_cuts(file: File, outcome: Repair) -> Iterator[ClipCut]:
     sound = File(file.container.strictly())
     for name, clip in file.clips.items():
         problems = clip_problems(sound, sound.clips[name])
-        # What only an unknown codec can decode is whole, if not for us.
+        # Parts for an unknown codec are intact, though not readable here.
         if not _real_problems(problems) and not (
             problems := problems and _end_problems(sound.clips[name])
         ):
@@ -281,7 +282,7 @@ def _plan_cuts(file: File, found: Repair) -> Iterator[ClipCut]:
             continue
         runs = list(_plan_runs(clip))
         yield from runs
-        found.lost += _list_losses(clip, runs, problems)
+        outcome.lost += _list_losses(clip, runs, problems)
 
 
 def _real_problems(problems: list[Problem]) -> list[Problem]:
@@ -289,7 +290,7 @@ def _real_problems(problems: list[Problem]) -> list[Problem]:
 
 
 def _end_problems(clip: Clip) -> list[Problem]:
-    """Problems of the end of a clip that cannot be decoded; nothing else has its hashes."""
+    """Problems of the end of a clip that cannot be decoded; only it has the hashes."""
     try:
         _ = clip.value_hashes, clip.source
     except MczError as error:
@@ -303,10 +304,10 @@ def _end_problems(clip: Clip) -> list[Problem]:
 
 def _plan_runs(clip: Clip) -> Iterator[WholeRun]:
     """A cut for each run of frames and the signals that can be decoded in it."""
-    with suppress(MczError):  # what cannot be planned is lost, as is told
+    with suppress(MczError):  # parts that cannot be planned are reported as lost
         parts = whole_parts(clip)
         if not parts and stated_frames(clip) == clip.n_frames == 0:
-            parts = [((0, 0), tuple(range(len(clip.signals))))]  # nothing can have been lost of it
+            parts = [((0, 0), tuple(range(len(clip.signals))))]  # no frame of it can be lost
         for run, kept in parts:
             one = clip if len(kept) == len(clip.signals) else SomeSignals(clip, kept)
             cut = plan_cut(one, run, None, 0)
@@ -361,13 +362,13 @@ def whole_parts(clip: Clip) -> list[tuple[Run, tuple[int, ...]]]:
         except MczError:  # its header, or a codec that is unknown here
             whole = []
         runs.append([(start - info.skip, stop - info.skip) for start, stop in whole])
-    edges = sorted({edge for found in runs for run in found for edge in run})
+    edges = sorted({edge for signal_runs in runs for run in signal_runs for edge in run})
     parts: list[tuple[Run, tuple[int, ...]]] = []
     for start, stop in pairwise(edges):
         kept = tuple(
             index
-            for index, found in enumerate(runs)
-            if any(first <= start and stop <= last for first, last in found)
+            for index, signal_runs in enumerate(runs)
+            if any(first <= start and stop <= last for first, last in signal_runs)
         )
         if parts and parts[-1][1] == kept and parts[-1][0][1] == start:
             parts[-1] = (parts[-1][0][0], stop), kept

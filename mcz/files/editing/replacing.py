@@ -1,7 +1,7 @@
-"""``replace``: one joint of a clip gets other values; no other stream of the file is touched.
+"""``replace``: other values for one joint of a clip; all other streams are unchanged.
 
-SPEC.md, "Replacing a joint", is normative. ``recoding.py`` codes the joint, this file writes what
-it has coded. Where all joints are coded in one and a caller allows it, the clip is coded anew.
+SPEC.md, "Replacing a joint", is normative. ``recoding.py`` encodes the joint, this file writes its
+streams. Where one group has all joints and the caller allows it, the clip is encoded again.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ class Replacement:
     """Result of ``replace``.
 
     The two numbers of bytes are those of the joint's streams, its masks and its exceptions: numbers
-    off the grid, which are counted, too. ``max_error``: how far a decoded value is from the one
-    that was given, at most, in source units.
+    off the grid, which are counted too. ``max_error``: greatest difference of a decoded value from
+    the given one, in source units.
 
-    ``anew``: the whole clip was coded anew, and other joints are off by at most ``others_error``;
-    the numbers of bytes are those of the clip then.
+    ``anew``: the whole clip was encoded again, and other joints are off by at most
+    ``others_error``; the numbers of bytes are those of the clip then.
     """
 
     clip: str
@@ -78,25 +78,25 @@ def replace(
     recode: bool = False,
     progress: Progress | None = None,
 ) -> Replacement:
-    """Give one joint of a clip other values; write the file to ``target``, by default in place.
+    """Replace the values of one joint of a clip; write the file to ``target``, by default in place.
 
-    ``source`` is what ``mcz.open`` takes, or a File that is open, which stays what it is and needs
-    a ``target``. ``clip`` may be None where there is only one. ``values``, of shape (n_frames,
-    channels of the joint), are in source units; a clip without a source file takes NaN for invalid.
-    The joint is coded anew with the clip's own codec and settings, all other streams are copied
-    byte for byte. A lossless clip takes every number exactly, or, ``on_grid``, the nearest that its
-    source would print. ``copies``: as ``mcz.write`` has it; None: where the file has some.
-    ``recode``: a clip whose codec codes all joints in one is decoded and coded anew, so that other
-    joints change a little, too; by default it is refused.
+    ``source`` is as in ``mcz.open``, or an open File, which does not change and needs a ``target``.
+    ``clip`` may be None where there is only one. ``values``, of shape (n_frames, channels of the
+    joint), are in source units; a clip without a source file takes NaN for invalid. The joint is
+    encoded with the clip's own codec and settings, all other streams are copied byte for byte. A
+    lossless clip stores every number exactly, or, ``on_grid``, the nearest that its source would
+    print. ``copies``: as in ``mcz.write``; None: if the file has some. ``recode``: a clip whose
+    codec codes all joints together is decoded and encoded again, so that other joints change a
+    little too; by default it is refused.
 
-    Raises OptionError where the codec cannot code a joint alone, or where ``target`` is the source,
-    MotionError for values that it cannot hold; the file is as it was then.
+    Raises OptionError where the codec cannot encode a joint alone, or where ``target`` is the
+    source, MotionError for values that it cannot store; the file is unchanged then.
     """
     with ExitStack() as stack:
         inputs = [source.name if isinstance(source, File) else source]
         if target is None:
             target, force, inputs = disk_path(source), True, []
-            if os.name == "posix":  # elsewhere nothing can be renamed to what is open
+            if os.name == "posix":  # elsewhere an open file cannot be replaced
                 lock_file(target, stack)
         stream = stack.enter_context(replacing_file(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
@@ -106,7 +106,7 @@ def replace(
         if recode and is_coded_with_others(chosen, joint):
             check_anew(chosen)
             edited = edit(chosen, joint, values, on_grid)
-            editor = _AnewEditor(copying, chosen, edited)
+            editor = _RecodingEditor(copying, chosen, edited)
         else:
             recoded = recode_joint(chosen, joint, values, on_grid)
             editor = _StreamEditor(copying, chosen, recoded)
@@ -124,7 +124,7 @@ class _Sizes:
     n_exceptions: int = 0
 
     def add(self, flag: int, stream: bytes) -> None:
-        """Count group notes or a mask, as ``flag`` says."""
+        """Count group notes or a mask, by ``flag``."""
         self.size += len(stream)
         if flag == GROUP_NOTES and stream:
             notes = parse(GroupNotes, stream, "group notes")
@@ -163,8 +163,6 @@ class _Editor(Copier):
 
 
 class _StreamEditor(_Editor):
-    """Puts the streams of the joint in the place of those that the clip has."""
-
     def __init__(self, copying: Copying, clip: Clip, recoded: Recoded) -> None:
         super().__init__(copying, clip)
         self.recoded, self.joint = recoded, recoded.joint
@@ -195,19 +193,19 @@ class _StreamEditor(_Editor):
         given, codec = self.recoded.given, self.recoded.info.codec
         if old is None and codec.lossless:
             return None
-        found = {} if codec.lossless else texts_of(figures(given, self.recoded.decoded))
+        new_figures = {} if codec.lossless else texts_of(figures(given, self.recoded.decoded))
         return edited_quality(
-            old or {}, codec.name, self.joint, with_indices(found, given.skeleton)
+            old or {}, codec.name, self.joint, with_indices(new_figures, given.skeleton)
         )
 
 
 class _SegmentEdit(Unchanged):
     def __init__(self, editor: _StreamEditor, row: SegmentRow, number: int) -> None:
         self._editor, self._number = editor, number
-        notes, masks = editor.recoded.beside(row.header.first, row.header.stop)
+        notes, masks = editor.recoded.side_data(row.header.first, row.header.stop)
         self._beside = {GROUP_NOTES: notes, MASKS: masks}
 
-    def beside(self, flag: int, group: int, old: bytes) -> bytes:
+    def group_data(self, flag: int, group: int, old: bytes) -> bytes:
         if group not in self._beside[flag]:
             return old
         new = self._beside[flag][group]
@@ -220,8 +218,8 @@ class _SegmentEdit(Unchanged):
         return old if streams is None else streams[resolution]
 
 
-class _AnewEditor(_Editor):
-    """Decodes the clip and codes it anew after its edit."""
+class _RecodingEditor(_Editor):
+    """Decodes the clip and encodes it again after its edit."""
 
     anew = True
 
@@ -239,27 +237,27 @@ class _AnewEditor(_Editor):
         self.after.size = sum(row.size for row in segments)
 
     def _amend_record(self, now: dict[str, str], decoded: Sequence[Values]) -> dict[str, str]:
-        wanted = self.edit.motion.signals[0].masked()
+        masked_values = self.edit.motion.signals[0].masked()
         with np.errstate(invalid="ignore"):  # infinities
-            difference = np.abs(decoded[0] - wanted)
+            difference = np.abs(decoded[0] - masked_values)
         own = np.zeros(difference.shape[1], np.bool_)
         own[list(self.edited.skeleton.columns(self.joint))] = True
         self.max_error = float(np.nanmax(difference[:, own], initial=0.0))
         self.others_error = float(np.nanmax(difference[:, ~own], initial=0.0))
         settings = {key: value for key, value in now.items() if key.startswith("param.")}
-        found = {k: v for k, v in now.items() if k != "codec" and k not in settings}
+        kept_entries = {k: v for k, v in now.items() if k != "codec" and k not in settings}
         old = self.edited.stored_quality or {}
-        record = edited_quality(old, now["codec"], self.joint, found)
+        record = edited_quality(old, now["codec"], self.joint, kept_entries)
         record = {k: v for k, v in record.items() if not k.startswith("param.")}
         return record | settings | {RECODED: "yes"}
 
 
 def edited_quality(
-    old: Mapping[str, str], codec: str, joint: int, found: Mapping[str, str]
+    old: Mapping[str, str], codec: str, joint: int, new_figures: Mapping[str, str]
 ) -> dict[str, str]:
     """The entries of the quality record of a clip in which a ``joint`` was edited, as stored.
 
-    ``old`` are those of before, ``found`` the figures of this edit.
+    ``old`` are the previous ones, ``new_figures`` those of this edit.
     """
     now = {"codec": codec}
     for key, value in old.items():
@@ -271,4 +269,4 @@ def edited_quality(
     now["edit-joints"] = ",".join(dict.fromkeys([*edited, str(joint)]))
     if RECODED in old:
         now[RECODED] = old[RECODED]
-    return now | {f"edit_{key}": value for key, value in found.items()}
+    return now | {f"edit_{key}": value for key, value in new_figures.items()}

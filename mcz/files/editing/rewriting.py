@@ -1,7 +1,7 @@
 """Rewriting of files: chunks are copied, not encoded.
 
 ``chunk_copier.py`` copies chunks, this module plans. The old file keeps its name until the new one
-is whole and was walked from end to end. ``protect``, which may rewrite a file, is here as well.
+is complete and has been read from end to end. ``protect``, which may rewrite a file, is here too.
 """
 
 from __future__ import annotations
@@ -28,7 +28,13 @@ from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
 from mcz.errors import AccessError, FormatError, OptionError, reason_of
 from mcz.files.editing.batch_report import Report
-from mcz.files.editing.chunk_copier import SAME, UNPROTECTED, Change, ChunkCopier, metadata_records
+from mcz.files.editing.chunk_copier import (
+    UNCHANGED,
+    UNPROTECTED,
+    Change,
+    ChunkCopier,
+    metadata_records,
+)
 from mcz.files.editing.protecting import (
     DEFAULT,
     Protection,
@@ -44,7 +50,7 @@ from mcz.model.schema import parse
 from mcz.model.types import Progress, Target
 
 Shared = tuple[bytes, bytes]  # type and id of a SKEL, MODL or SRCE
-Step = Callable[[str], None]  # is told the name of each clip that was carried over
+Step = Callable[[str], None]  # called with the name of each copied clip
 
 
 def steps(progress: Progress | None, total: int) -> Step:
@@ -59,12 +65,12 @@ def steps(progress: Progress | None, total: int) -> Step:
 
 KINDS = CLIP, ATTACHMENT, ALIAS = "clip", "attachment", "alias"
 SKELETON = "skeleton"
-Thing = tuple[str, str]  # its kind and its name, of a skeleton its id in hex
+Thing = tuple[str, str]  # (kind, name); for a skeleton its id in hex is the name
 
 
-def things_in(held: File | Directory) -> Iterator[Thing]:
-    """All that a file has under a name, in order."""
-    names = (CLIP, held.clips), (ATTACHMENT, held.attachments), (ALIAS, held.aliases)
+def things_in(file: File | Directory) -> Iterator[Thing]:
+    """The named contents of a file, in order."""
+    names = (CLIP, file.clips), (ATTACHMENT, file.attachments), (ALIAS, file.aliases)
     return ((kind, name) for kind, names_of in names for name in names_of)
 
 
@@ -72,23 +78,23 @@ def things_in(held: File | Directory) -> Iterator[Thing]:
 class Plan:
     """The parts of a file that go into a new one.
 
-    ``things`` are what has a name, clips in their new order, and what is said otherwise of them.
-    ``shared`` goes along, needed by a clip or not. ``purges``: no META is carried over, for the
-    clips have their metadata in CLIP.
+    ``things`` are named contents with their changes, clips in their new order. ``shared`` is copied
+    too, whether a clip needs it or not. ``drops_meta``: META is not copied, for the clips have
+    their metadata in CLIP.
     """
 
     things: dict[Thing, Change] = field(default_factory=dict)
     shared: list[Shared] = field(default_factory=list)
-    purges: bool = False
+    drops_meta: bool = False
 
-    def of(self, kind: str) -> dict[str, Change]:
+    def things_of(self, kind: str) -> dict[str, Change]:
         """The things of one kind by name."""
         return {name: change for (its, name), change in self.things.items() if its == kind}
 
 
 def plan_whole(file: File) -> Plan:
-    """All of a file, as it is."""
-    return Plan(dict.fromkeys(things_in(file), SAME), list(file.container.directory.shared))
+    """Plan to copy a file unchanged."""
+    return Plan(dict.fromkeys(things_in(file), UNCHANGED), list(file.container.directory.shared))
 
 
 def used_by(file: File, names: Iterable[str]) -> set[Shared]:
@@ -109,45 +115,48 @@ def used_by(file: File, names: Iterable[str]) -> set[Shared]:
 
 def used_by_skeleton(container: Container, id_: bytes) -> set[Shared]:
     """A skeleton, its bases, and the templates of their own files."""
-    found: set[Shared] = set()
-    wanted: bytes | None = id_
-    while wanted and (ChunkType.SKEL, wanted) not in found:
-        fields = container.skeleton_fields(wanted)
-        found.add((ChunkType.SKEL, wanted))
-        found |= {(ChunkType.SRCE, bytes(source.template)) for source in [fields.source] if source}
-        wanted = fields.base
-    return found
+    used: set[Shared] = set()
+    next_id: bytes | None = id_
+    while next_id and (ChunkType.SKEL, next_id) not in used:
+        fields = container.skeleton_fields(next_id)
+        used.add((ChunkType.SKEL, next_id))
+        if fields.source:
+            used.add((ChunkType.SRCE, bytes(fields.source.template)))
+        next_id = fields.base
+    return used
 
 
-def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
-    """Write what ``plan`` says of ``file``; return what may not be carried over."""
-    carrier = ChunkCopier(file.container, writer)
-    carrier.before_clips()
+def copy_things(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
+    """Copy the contents that ``plan`` lists; return what is not copied."""
+    copier = ChunkCopier(file.container, writer)
+    copier.before_clips()
     for kind, id_ in plan.shared:
         if kind == ChunkType.SKEL:
-            carrier.skeleton(id_)
+            copier.skeleton(id_)
         else:
-            carrier.shared(kind, id_)
-    for name, change in plan.of(ATTACHMENT).items():
-        carrier.attachment(name, change.name)
-    clips = plan.of(CLIP)
+            copier.shared(kind, id_)
+    for name, change in plan.things_of(ATTACHMENT).items():
+        copier.attachment(name, change.name)
+    clips = plan.things_of(CLIP)
     for name, change in clips.items():
-        carrier.clip(name, change)
+        copier.clip(name, change)
         step(name)
-    for name, change in plan.of(ALIAS).items():
-        of, target = file.aliases[name]
-        renamed = plan.things.get(file.alias_of(name), SAME).name
-        writer.alias(change.name or name, of, target if renamed is None else renamed.encode())
-    if plan.purges and file.metadata:
+    for name, change in plan.things_of(ALIAS).items():
+        target_kind, target = file.aliases[name]
+        renamed = plan.things.get(file.alias_of(name), UNCHANGED).name
+        writer.alias(
+            change.name or name, target_kind, target if renamed is None else renamed.encode()
+        )
+    if plan.drops_meta and file.metadata:
         writer.metadata([Record("", file.metadata)])
-    elif clips and not plan.purges:
+    elif clips and not plan.drops_meta:
         names = ((name, change.name or name) for name, change in clips.items())
         writer.metadata(metadata_records(file.container, names))
-    return carrier.left_out
+    return copier.left_out
 
 
-def path_of(file: File, thing: Thing, change: Change = SAME) -> str:
-    """The path under which a thing is restored; "" where it is not."""
+def path_of(file: File, thing: Thing, change: Change = UNCHANGED) -> str:
+    """The path under which a thing is restored; "" if it is not."""
     kind, name = thing
     if kind != CLIP:
         return change.name or name
@@ -173,7 +182,7 @@ def writer_like(stream: BinaryIO, files: Iterable[File], copies: bool | None = N
 
 @dataclass(frozen=True, slots=True)
 class Rewriting:
-    """A file that is rewritten to ``output``, or in its own place where that is None."""
+    """A file that is rewritten to ``output``, or in place where ``output`` is None."""
 
     target: Target
     output: Target | None
@@ -181,22 +190,22 @@ class Rewriting:
     file: File
 
     def write(self, plan: Plan, report: Report, step: Step) -> None:
-        """Write what ``plan`` says; ``report`` learns the size, and what was left out."""
+        """Write the contents of ``plan``; ``report`` gets the size and what was left out."""
         in_place = self.output is None
         inputs = () if in_place else (self.target,)
         path = disk_path(self.target) if self.output is None else self.output
         with replacing_file(path, force=self.force or in_place, inputs=inputs) as stream:
-            left_out = self.written(stream, plan, step)
+            left_out = self.copy_to(stream, plan, step)
             if in_place and UNPROTECTED in left_out:
                 left_out.remove(UNPROTECTED)
                 protect_written(stream, redundancy_of(self.file.container) or DEFAULT)
             report.size = stream.tell()
         report.left_out += left_out
 
-    def written(self, stream: BinaryIO, plan: Plan, step: Step) -> list[str]:
-        """Write what ``plan`` says to ``stream``; return what was left out."""
+    def copy_to(self, stream: BinaryIO, plan: Plan, step: Step) -> list[str]:
+        """Write the contents of ``plan`` to ``stream``; return what was left out."""
         writer = writer_like(stream, [self.file])
-        left_out = carry(self.file, writer, plan, step)
+        left_out = copy_things(self.file, writer, plan, step)
         writer.finish()
         return left_out
 
@@ -205,7 +214,7 @@ class Rewriting:
 def rewriting(
     target: Target, output: Target | None = None, *, force: bool = False
 ) -> Iterator[Rewriting]:
-    """The file to be rewritten; where it is to take its own place, nobody appends meanwhile.
+    """Open a file to rewrite; if it is rewritten in place, it is locked against appending.
 
     Raises AccessError where another process is appending to it.
     """
@@ -252,23 +261,23 @@ def protect(
     and as ``mcz.append`` for a file cut short.
     """
     check_redundancy(redundancy)
-    if anew and (found := _protected_anew(target, redundancy, progress)) is not None:
-        return [found]
+    if anew and (protection := _protected_anew(target, redundancy, progress)) is not None:
+        return [protection]
     return add_recovery(target, redundancy, progress)
 
 
 def _protected_anew(
     target: Target, redundancy: float, progress: encoder.Step | None
 ) -> Protection | None:
-    """Rewrite a file with recovery data for all of it; None, and nothing done, where it has none.
+    """Rewrite a file with recovery data for all of it; None without a change if it has none.
 
-    The file has its old ones until it has the new ones.
+    The old recovery data stay until the new are written.
     """
     with rewriting(target) as job:
         if redundancy_of(job.file.container) is None:
             return None
         with replacing_file(disk_path(target), force=True) as stream:
-            left_out = job.written(stream, plan_whole(job.file), lambda name: None)
+            left_out = job.copy_to(stream, plan_whole(job.file), lambda name: None)
             if lost := [text for text in left_out if text != UNPROTECTED]:
                 raise FormatError(f"rewriting it would lose {lost[0]}", path=job.file.name)
             return protection_of(protect_written(stream, redundancy, progress))

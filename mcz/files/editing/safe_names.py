@@ -1,4 +1,4 @@
-"""Names that not every system can hold, and a folder that is written to without following links."""
+"""Names that are invalid on some systems, and a folder that is written without following links."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LONGEST = 255  # bytes of UTF-8 that a part of a path may have
 
 
 def fault_of(part: str) -> str:
-    """Name the fault of a path's part that not every system can hold; "" for none."""
+    """Name the fault of a path's part that is invalid on some systems; "" for none."""
     if odd := HIDDEN.search(part) or ODD.search(part):
         return f"it has {odd[0]!a}"
     if DEVICES.fullmatch(part):
@@ -46,9 +46,9 @@ def folded(name: str) -> str:
 
 
 def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[str, str]:
-    """Reasons by path, for each that not every system can hold, alone or beside another.
+    """Reasons by path, for each that is invalid on some systems, alone or next to another.
 
-    ``of``: those that are asked about, None: all.
+    ``of``: the paths to check, None: all.
     """
     notes: dict[str, str] = {}
     seen: dict[str, str] = {}
@@ -71,16 +71,16 @@ def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[st
 
 
 class PortableNames:
-    """Gives paths names that every system can hold, one beside the other.
+    """Gives paths names that are valid on every system, also next to each other.
 
-    ``change`` makes such a name of a part of a path; those ``taken`` are given to nobody.
+    ``change`` makes such a name of a part of a path; ``taken`` names are never given.
     """
 
     def __init__(
         self, change: Callable[[str], str] | None = None, taken: Iterable[str] = ()
     ) -> None:
         self._change = _portable if change is None else change
-        self._given: dict[str, str] = {}  # the parts of a path that was given, "/" between -> its
+        self._given: dict[str, str] = {}  # parts of a path, joined by "/" -> their new name
         self._taken = set(map(folded, taken))
 
     def __call__(self, path: str) -> str:
@@ -102,7 +102,7 @@ class PortableNames:
 
 
 def visible(part: str) -> str:
-    """Return a part of a path with ``_`` for each character that would not be seen.
+    """Replace each invisible character of a part of a path by ``_``.
 
     >>> visible("a:b" + chr(0x202E) + "gpj.c3d"), visible("Icon" + chr(13))
     ('a:b_gpj.c3d', 'Icon_')
@@ -128,7 +128,7 @@ def _portable(part: str) -> str:
 
 
 class Folder:
-    """A folder in which files appear; no link in it is followed, and no file written twice."""
+    """A folder of new files; links in it are not followed, and no file is written twice."""
 
     def __init__(self, root: Path) -> None:
         self._root = root
@@ -137,9 +137,9 @@ class Folder:
     def place(self, path: str, *, force: bool) -> Path:
         """Return the place of the file ``path``, with the folders above it created.
 
-        Raises AccessError where a link, or what is neither file nor folder, stands in the way, and
-        ExistsError for a file that is there, which with ``force`` is one that was just written: the
-        disk takes two names for the same.
+        Raises AccessError where a link, or something other than a file or folder, is in the way,
+        and ExistsError for an existing file, which with ``force`` is one that was just written: the
+        disk does not distinguish the two names.
         """
         parts = PurePosixPath(path).parts
         if os.name == "nt":
@@ -150,18 +150,18 @@ class Folder:
         place = self._root
         for part in parts[:-1]:
             place = place / part
-            found = _lstat(place)
-            if found is None:
+            status = _lstat(place)
+            if status is None:
                 place.mkdir(exist_ok=True)
-            elif not stat.S_ISDIR(found.st_mode) or _is_junction(place):
-                raise AccessError(f"it is {_kind(found)}, where a folder is needed", path=place)
+            elif not stat.S_ISDIR(status.st_mode) or _is_junction(place):
+                raise AccessError(f"it is {_kind(status)}, where a folder is needed", path=place)
         place = place / parts[-1]
-        found = _lstat(place)
-        if found is None:
+        status = _lstat(place)
+        if status is None:
             return place
-        if not stat.S_ISREG(found.st_mode):
-            raise AccessError(f"it is {_kind(found)}, which is not written to", path=place)
-        if (other := self._written.get((found.st_dev, found.st_ino))) is not None:
+        if not stat.S_ISREG(status.st_mode):
+            raise AccessError(f"it is {_kind(status)}, which is not written to", path=place)
+        if (other := self._written.get((status.st_dev, status.st_ino))) is not None:
             raise ExistsError(
                 f"this disk takes it for the same name as {other!r}, which was just written",
                 hint=Hint.PORTABLE_NAMES,
@@ -171,15 +171,15 @@ class Folder:
         return place
 
     def write(self, path: str, data: bytes, source: Target, *, force: bool, name: str = "") -> Path:
-        """Write the file ``path``, made of ``source``; return where it is, as ``place`` has it.
+        """Write the file ``path`` from ``source``; return its place, as ``place``.
 
-        ``name`` is what it is called where another file meets it.
+        ``name`` is its name for the error if another file has its place.
         """
         place = self.place(path, force=force)
         with replacing(place, force=force, inputs=(source,)) as stream:
             stream.write(data)
-        if (found := _lstat(place)) is not None:
-            self._written[found.st_dev, found.st_ino] = name or path
+        if (status := _lstat(place)) is not None:
+            self._written[status.st_dev, status.st_ino] = name or path
         return place
 
 
@@ -197,9 +197,9 @@ def _is_junction(place: Path) -> bool:
     return bool(attributes & getattr(stat, "FILE_ATTRIBUTE_REPARSE_POINT", 0))
 
 
-def _kind(found: os.stat_result) -> str:
-    if stat.S_ISLNK(found.st_mode):
+def _kind(status: os.stat_result) -> str:
+    if stat.S_ISLNK(status.st_mode):
         return "a symbolic link"
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         return "a folder"
-    return "a file" if stat.S_ISREG(found.st_mode) else "neither a file nor a folder"
+    return "a file" if stat.S_ISREG(status.st_mode) else "neither a file nor a folder"

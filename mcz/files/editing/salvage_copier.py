@@ -1,8 +1,8 @@
-"""Copying what is whole out of a damaged file: clips, runs of frames of others, some signals.
+"""Copy the intact parts of a damaged file: clips, runs of frames of others, some signals.
 
-Stored bytes are copied, never coded anew. Of a clip that has lost frames, each run of frames that
-can still be decoded becomes a clip of its own. Nothing is made up: what is lost stays lost.
-SPEC.md, "Salvage" and "Cutting without re-encoding", are normative.
+Stored bytes are copied, never encoded again. Of a clip that has lost frames, each run of frames
+that can still be decoded becomes a clip of its own. Lost values are never replaced. SPEC.md,
+"Salvage" and "Cutting without re-encoding", are normative.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from mcz.model.schema import build
 Run = tuple[int, int]  # frames a <= f < b
 NOTE = "lost: the template of the source file was damaged"
 NOTE_OF_SIGNALS = "lost: other signals of the clip were damaged, and with them its source file"
-# What of a clip is written: all, or without what breaks a rule though its checksums are right.
-FULL, WITHOUT_CHUNKS, WITHOUT_SOURCE_FILE, NOTHING = range(4)
+# Parts of a clip to write: all, or without parts that break a rule though their checksums are
+# right.
+FULL, WITHOUT_CHUNKS, WITHOUT_SOURCE_FILE, NO_PART = range(4)
 
 
 @dataclass(slots=True)
 class Repair:
-    """The outcome of ``repair``: names of whole things, runs of frames of other clips, losses.
+    """The outcome of ``repair``: names of intact things, runs of frames of other clips, losses.
 
-    ``damage`` is what was found wrong with the file, ``lost`` what of its content is gone.
-    ``recovery``: what its recovery data found, where it has some; ``restored``: these have given
-    every byte back, so that nothing is lost.
+    ``damage`` lists faults of the file, ``lost`` its lost contents. ``recovery``: result of its
+    recovery data, if any; ``restored``: these have restored every byte, so that nothing is lost.
     """
 
     clips: list[str] = field(default_factory=list)
@@ -53,7 +53,7 @@ class Repair:
 
 
 def stated_frames(clip: Clip) -> int:
-    """The number of frames that a clip has had; of one that was cut short CLIP says it."""
+    """The number of frames of the original clip; CLIP states it for a truncated one."""
     with suppress(MczError):
         row = clip.container.directory.clips[clip.name]
         return max(clip.n_frames, int(clip.container.clip(row).n_frames))
@@ -67,7 +67,7 @@ def about_clip(name: str, problem: Problem) -> str:
 
 
 class SomeSignals(Clip):
-    """The rest of a clip of which some signals are lost, and with them its source."""
+    """The rest of a clip that has lost some signals, and so its source."""
 
     def __init__(self, clip: Clip, kept: tuple[int, ...]) -> None:
         super().__init__(clip.container, clip.container.directory.clips[clip.name])
@@ -83,12 +83,12 @@ class SomeSignals(Clip):
 
 
 def has_motion(clip: Clip) -> bool:
-    """True of a clip, or the rest of one, that has its first signal."""
+    """True for a clip, or the rest of one, with its first signal."""
     return not isinstance(clip, SomeSignals) or 0 in clip.kept
 
 
 class WholeRun(ClipCut):
-    """A run of frames of a damaged clip: hashes and source are made anew, whatever its length."""
+    """A run of frames of a damaged clip: hashes and source are always computed again."""
 
     __slots__ = ()
 
@@ -98,7 +98,7 @@ class WholeRun(ClipCut):
 
     @property
     def name(self) -> str:
-        """The name of the clip where all frames of its motion are there."""
+        """The name of the clip if no frame of its motion is lost."""
         if has_motion(self.clip) and self.n_frames == stated_frames(self.clip):
             return self.clip.name
         of = "" if has_motion(self.clip) else f".{self.clip.signals[0].name}"
@@ -106,11 +106,11 @@ class WholeRun(ClipCut):
 
 
 class Repairer(Copier):
-    """Copies what is whole, and of everything else says that it is lost."""
+    """Copies the intact parts, and reports all others as lost."""
 
-    def __init__(self, copying: Copying, found: Repair, degrees: Mapping[str, int]) -> None:
+    def __init__(self, copying: Copying, outcome: Repair, degrees: Mapping[str, int]) -> None:
         super().__init__(copying)
-        self.repair, self.degrees = found, degrees
+        self.repair, self.degrees = outcome, degrees
         self._skeletons: dict[bytes, bytes] = {}  # the id that each has now
 
     def name_of(self, cut: ClipCut) -> str:
@@ -145,12 +145,12 @@ class Repairer(Copier):
         for cut in cuts:
             if degree := self._degree_of(cut):
                 what = "chunks that belong to it, which break a rule"
-                if degree == NOTHING:
+                if degree == NO_PART:
                     what = "all of it, which breaks a rule"
                 self.repair.lost.append(f"clip {self.name_of(cut)!r}: {what}")
-        super().run([cut for cut in cuts if self._degree_of(cut) < NOTHING], alone=alone)
+        super().run([cut for cut in cuts if self._degree_of(cut) < NO_PART], alone=alone)
 
-    def note(self, cut: ClipCut) -> None:
+    def record_result(self, cut: ClipCut) -> None:
         if isinstance(cut, WholeRun):
             self.repair.runs.setdefault(cut.clip.name, []).append((cut.start, cut.stop))
         else:
@@ -159,14 +159,14 @@ class Repairer(Copier):
     def skeletons(self) -> None:
         for kind, id_ in self.container.directory.shared:
             if kind == ChunkType.SKEL:
-                with suppress(FormatError):  # what is wrong with it clips say, and is told
+                with suppress(FormatError):  # its fault is reported with the clips
                     self.skeleton(id_)
                     self.repair.skeletons.append(self.container.skeleton(id_).name or id_.hex())
 
     def attachments(self) -> None:
-        for name, held in self.file.attachments.items():
+        for name, attachment in self.file.attachments.items():
             try:
-                held.read()
+                attachment.read()
             except MczError as error:
                 self.repair.lost.append(f"attachment {name!r}: {error}")
                 continue
@@ -174,34 +174,33 @@ class Repairer(Copier):
             self.repair.attachments.append(name)
 
     def before_clips(self) -> None:
-        with suppress(FormatError):  # what is damaged there has been told
+        with suppress(FormatError):  # the damage is already reported
             super().before_clips()
 
-    def inside(self, row: ClipRow) -> None:
+    def copy_before_cend(self, row: ClipRow) -> None:
         with suppress(FormatError):
             if row.cend is not None and self.degrees.get(row.name, FULL) == FULL:
-                super().inside(row)
+                super().copy_before_cend(row)
 
     def skeleton(self, id_: bytes) -> bytes:
-        """Without its source or its base, and so under another id, where these are lost."""
+        """Without its source or its base, and so under another id, if these are lost."""
         chain: dict[bytes, None] = {}
-        wanted: bytes | None = id_
-        while wanted and wanted not in self._skeletons and wanted not in chain:
-            chain[wanted] = None
+        next_id: bytes | None = id_
+        while next_id and next_id not in self._skeletons and next_id not in chain:
+            chain[next_id] = None
             with suppress(FormatError):
-                wanted = self.container.skeleton_fields(wanted).base
+                next_id = self.container.skeleton_fields(next_id).base
         for one in reversed(chain):
             with suppress(FormatError) if one != id_ else nullcontext():
                 self._skeletons[one] = self._copy_skeleton(one)
         return self._skeletons[id_]
 
     def _copy_skeleton(self, id_: bytes) -> bytes:
-        """Copy a skeleton, whose base is copied; return its id."""
         fields = self.container.skeleton_fields(id_)
         base = self._skeletons.get(fields.base) if fields.base else None
         try:
             if base != (fields.base or None):
-                raise FormatError("its base is not what it was")
+                raise FormatError("its base is not the original one")
             if fields.source:
                 self.file.skeleton_bytes(id_)
             return super().skeleton(id_)
@@ -230,23 +229,23 @@ class Repairer(Copier):
             note_source(new, NOTE_OF_SIGNALS)
         try:
             if self._degree_of(cut) >= WITHOUT_SOURCE_FILE and new.source:
-                raise FormatError("what it gives is not what the clip says")
-            found = super().finish_record(cut, new)
+                raise FormatError("its result differs from the clip")
+            hashes = super().finish_record(cut, new)
         except FormatError as error:
             if new.source is None:
                 raise
-            found = self._without_source(cut, new, error)
+            hashes = self._without_source(cut, new, error)
         is_renamed = isinstance(cut, WholeRun) and cut.name != cut.clip.name
         if is_renamed and new.source and new.source.path:
             path = PurePosixPath(new.source.path)
             named = path.with_name(f"{path.stem}.{cut.start}-{cut.stop}{path.suffix}")
             new.source = replace(new.source, path=str(named))
-        return found
+        return hashes
 
     def _without_source(
         self, cut: ClipCut, new: payloads.Clip, error: FormatError
     ) -> tuple[bytes, list[bytes]]:
-        """The same of a clip whose template is lost, and with it what the file was like."""
+        """The same of a clip whose template is lost, and with it the original file."""
         text = f"clip {cut.clip.name!r}: its source file: {error}"
         if text not in self.repair.lost:
             self.repair.lost.append(text)

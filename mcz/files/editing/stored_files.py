@@ -1,4 +1,4 @@
-"""Files that an MCZ file restores: read without records, for there may be many."""
+"""Files that an MCZ file restores: read without records, since there may be many."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from mcz.files.reading.file import File
 from mcz.files.writing.write_transaction import Digest
 from mcz.model.schema import parse, parse_until, read_varint
 
-Content = dict[bytes, tuple[int, bytes]]  # SHA-256 of a file -> what ALIA says of it
+Content = dict[bytes, tuple[int, bytes]]  # SHA-256 of a file -> target of an alias
 
 
 def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
     """Index the restored files by path, with their SHA-256 or its getter, and by content.
 
-    What is damaged cannot be restored, and is left out.
+    Damaged ones cannot be restored, and are left out.
     """
     paths: dict[str, Digest] = {}
     contents: Content = {}
@@ -31,9 +31,9 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
         contents.setdefault(digest, (payloads.OF_CLIP, name.encode()))
         if path:
             paths.setdefault(path, digest)
-    for name, held in container.directory.attachments.items():
+    for name, attachment in container.directory.attachments.items():
         with suppress(FormatError):
-            part = held.parts[0]
+            part = attachment.parts[0]
             digest = bytes(parse(payloads.Atta, container.payload(part), part.label).sha256)
             contents.setdefault(digest, (payloads.OF_ATTACHMENT, name.encode()))
             paths.setdefault(name, digest)
@@ -41,13 +41,13 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
     by_target = {target: digest for digest, target in contents.items()} if aliases else {}
     file = File(container)
     for name, alias in aliases.items():
-        found = by_target.get((alias[0], bytes(alias[1])))
-        paths.setdefault(name, found or partial(_digest_of, _restorer_of(file, *alias)))
+        target_digest = by_target.get((alias[0], bytes(alias[1])))
+        paths.setdefault(name, target_digest or partial(_digest_of, _restorer_of(file, *alias)))
     return paths, contents
 
 
 def _clip_sources(container: Container) -> Iterator[tuple[str, str, bytes]]:
-    """Name, path and digest of each clip with a source; no row of the directory is made for it."""
+    """Name, path and digest of each clip with a source; without rows of the directory."""
     read = Forward(container.source, 0)
     for name, at, size, cend_at, cend_size in container.directory.clips.places():
         if not cend_size:
@@ -60,14 +60,13 @@ def _clip_sources(container: Container) -> Iterator[tuple[str, str, bytes]]:
 
 
 def _check_chunk(chunk: bytes) -> bytes:
-    """The payload of a whole chunk; raises FormatError where its crc is wrong."""
+    """The payload of a whole chunk; raises FormatError for a wrong crc."""
     if CRC.pack(zlib.crc32(memoryview(chunk)[: -CRC.size])) != chunk[-CRC.size :]:
         raise FormatError("a damaged chunk")
     return chunk[HEADER.size : -CRC.size]
 
 
 def _parse_path(clip: bytes) -> str | None:
-    """The path of the source in the payload of a CLIP, None without one."""
     size, at = read_varint(clip, 2)
     flags, at = clip[at + size], at + size + 17
     if flags & payloads.HAS_TIME_BASE:

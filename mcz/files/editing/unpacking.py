@@ -1,4 +1,4 @@
-"""All files of an archive out of it again, each under its path, and only when it is whole."""
+"""Restore all files of an archive, each under its path, only complete ones."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mcz.files.editing.batch_report import Outcome, Report, failure_outcome
 from mcz.files.editing.folders import set_time
 from mcz.files.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Thing
 from mcz.files.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visible
-from mcz.files.jobs import limited
+from mcz.files.jobs import limit_jobs
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import list_some
 from mcz.files.reading.fidelity import RESTORED, fidelity_of
@@ -25,7 +25,7 @@ from mcz.files.reading.parallel_clips import share_clips
 from mcz.files.reading.rate_notes import text_notes
 from mcz.model.types import Progress, Settings, Target
 
-NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
+NAMES = ("stored", "portable", "strict")  # treatment of names that are not portable
 
 
 def unpack(
@@ -45,30 +45,30 @@ def unpack(
 ) -> Report:
     """Write every source file and attachment of an MCZ file below ``directory``.
 
-    ``clips``: of these clips alone, and of their skeletons; ``where``: of those that it takes, see
-    ``File.find``. Each file appears under its name only when it is whole and its hash is right. No
-    symbolic link below ``directory`` is followed. Clips without a source are reported as skipped.
-    With ``salvage`` the file may be damaged: what is whole is written, the rest is reported as
-    damaged. ``max_decoded`` and ``threads`` are those of ``mcz.open``. ``jobs`` processes may
-    restore at once, by default one.
+    ``clips``: only these clips, and their skeletons; ``where``: only clips that match it, see
+    ``File.find``. Each file appears under its name only when it is complete and its hash is right.
+    No symbolic link below ``directory`` is followed. Clips without a source are reported as
+    skipped. With ``salvage`` the file may be damaged: intact files are written, the rest is
+    reported as damaged. ``max_decoded`` and ``threads`` are as in ``mcz.open``. ``jobs`` processes
+    restore in parallel, by default one.
 
-    ``names`` decides about names that some system cannot hold, or not beside another: "stored"
-    writes them as they are, but for control characters and those that turn the direction of text,
-    of which the outcomes tell, and refuses what this system or disk cannot hold; "portable" gives
-    them others, which the outcomes tell; "strict" refuses them. One file never replaces another of
-    the same archive. ``mtimes``: files get the time of their last change that the metadata of
-    their clip has, where it has one (``mcz.pack(..., mtimes=True)``).
+    ``names`` decides about names that are invalid on some systems, or next to another: "stored"
+    writes them unchanged, except control characters and those that turn the direction of text,
+    which the outcomes report, and refuses names that this system or disk cannot have; "portable"
+    gives them others, which the outcomes report; "strict" refuses them. One file never replaces
+    another of the same archive. ``mtimes``: files get the modification time in the metadata of
+    their clip, if it has one (``mcz.pack(..., mtimes=True)``).
     """
     if names not in NAMES:
         raise OptionError(f"names is {names!r}, not one of {', '.join(NAMES)}")
     folder, report = Folder(Path(directory)), Report()
     options: Settings = {"max_decoded": max_decoded, "threads": threads}
-    with limited(jobs), open(target, salvage=salvage, **options) as opened:
+    with limit_jobs(jobs), open(target, salvage=salvage, **options) as opened:
         file = File(opened.container.strictly())
         report.damage += opened.damage
-        timeless: list[str] = []  # files whose times the archive does not have
-        wanted, whole = file.chosen(clips, where), clips is None and where is None
-        stored = list(files_of(file, None if whole else wanted))
+        timeless: list[str] = []  # files whose times are not in the archive
+        chosen_clips, whole = file.chosen(clips, where), clips is None and where is None
+        stored = list(files_of(file, None if whole else chosen_clips))
         writing = _Writing(target, folder, force, names, [one.path for one in stored])
         with share_clips(_restore, file, stored) as restoring:
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
@@ -87,7 +87,7 @@ def unpack(
                     progress(done + 1, len(stored), one.path)
         if timeless:
             report.left_out.append(f"times of files that are no clips: {list_some(timeless)}")
-        report.outcomes += _fileless_outcomes(wanted)
+        report.outcomes += _fileless_outcomes(chosen_clips)
     return report
 
 
@@ -100,44 +100,43 @@ def _fileless_outcomes(clips: Iterable[Clip]) -> Iterator[Outcome]:
 
 
 @dataclass(frozen=True, slots=True)
-class Stored:
-    """A file that the archive holds under ``path``, as the ``kind`` of thing called ``name``."""
+class StoredFile:
+    """A file of the archive under ``path``, from the thing ``name`` of that ``kind``."""
 
     path: str
     kind: str
     name: str
 
 
-def files_of(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Stored]:
-    """Every file that the archive holds under a name; of ``clips`` their sources and skeletons."""
+def files_of(file: File, clips: Sequence[Clip] | None = None) -> Iterator[StoredFile]:
+    """Every file of the archive; of ``clips`` only their sources and skeletons."""
     for clip in file if clips is None else clips:
         try:
             path = clip.source.path if clip.source is not None else ""
-        except FormatError:  # which is that of restoring it, and no other clip's
+        except FormatError:  # restoring it reports the error
             path = clip.name
         if path:
-            yield Stored(path, CLIP, clip.name)
+            yield StoredFile(path, CLIP, clip.name)
     for name in file.attachments if clips is None else ():
-        yield Stored(name, ATTACHMENT, name)
+        yield StoredFile(name, ATTACHMENT, name)
     skeletons = None if clips is None else {id_.hex() for id_ in file.skeleton_ids(clips)}
     for name in file.aliases:
         kind, target = file.alias_of(name)
         if skeletons is None or (kind == SKELETON and target in skeletons):
-            yield Stored(name, ALIAS, name)
+            yield StoredFile(name, ALIAS, name)
 
 
 def named_files(file: File) -> Iterator[tuple[str, Callable[[], bytes]]]:
-    """Path and restoring function of every file that the archive holds under a name."""
+    """Path and restoring function of every file of the archive."""
     for one in files_of(file):
         yield one.path, partial(_restore, (file, None), one)
 
 
-def _resolve(file: File, one: Stored) -> Thing:
-    """The thing that a file is, or that the alias which it is stands for."""
+def _resolve(file: File, one: StoredFile) -> Thing:
     return file.alias_of(one.name) if one.kind == ALIAS else (one.kind, one.name)
 
 
-def _restore(shared: tuple[File, object], one: Stored) -> bytes:
+def _restore(shared: tuple[File, object], one: StoredFile) -> bytes:
     """The bytes of a file; raises FormatError where they cannot be restored."""
     file, _ = shared
     kind, name = _resolve(file, one)
@@ -148,8 +147,8 @@ def _restore(shared: tuple[File, object], one: Stored) -> bytes:
     return file.clips[name].source_bytes() if kind == CLIP else file.attachments[name].read()
 
 
-def _fidelity_of(file: File, one: Stored) -> str:
-    """The word for a file that was written: other than "restored" only of a clip."""
+def _fidelity_of(file: File, one: StoredFile) -> str:
+    """The word for a written file: other than "restored" only of a clip."""
     kind, name = _resolve(file, one)
     clip = file.clips.get(name) if kind == CLIP else None
     return RESTORED if clip is None else fidelity_of(clip)
@@ -158,7 +157,7 @@ def _fidelity_of(file: File, one: Stored) -> str:
 class _Writing:
     """Writes files below a folder, no two to one place.
 
-    ``is_damaged``: the last one could not be restored, or may not be called what it is.
+    ``is_damaged``: the last one could not be restored, or its name is not allowed.
     """
 
     def __init__(
@@ -173,7 +172,7 @@ class _Writing:
         self.place = Path()  # of the file that was written last
 
     def outcome(self, path: str, restore: Callable[[], bytes]) -> Outcome:
-        """Write what ``restore`` gives to its place; what became of it."""
+        """Write the result of ``restore`` to its place; return the outcome."""
         self.is_damaged = False
         try:
             size, as_path = self._write(path, restore)
@@ -199,6 +198,6 @@ class _Writing:
 
 
 def safe_path(name: str) -> PurePosixPath:
-    """``name`` as a relative path; raises FormatError where it would leave the folder."""
+    """``name`` as a relative path; raises FormatError if it would leave the folder."""
     check_path(name, "archive")
     return PurePosixPath(name)

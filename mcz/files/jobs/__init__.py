@@ -1,4 +1,4 @@
-"""Numbers of processes that work on the files of a command, and when they pay.
+"""Numbers of processes that work on the files of a command, and their break-even.
 
 ``pool.py`` runs them. Parsing is Python, which threads of one process share and processes do not:
 packing takes half the time with two. Results do not depend on the number.
@@ -17,11 +17,11 @@ from mcz.model import threads
 
 LEAST_BYTES = 8_000_000  # of source files; fewer are done before a worker has started
 LEAST_STORED = 2_000_000  # the same, of an MCZ file
-ONE = 1  # in a library nobody expects processes that were not asked for
+DEFAULT_JOBS = 1  # a library must not start processes unasked
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-Answer = Callable[[], Result]  # gives a result, or raises what the function has raised
+Answer = Callable[[], Result]  # returns a result, or raises the error of the function
 
 
 class Engine(Protocol):
@@ -39,14 +39,14 @@ _ENGINE: ContextVar[Engine | None] = ContextVar("engine", default=None)
 _LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)
 
 
-def in_force() -> int:
-    """Number of processes that a call may use: one, unless more are asked for."""
-    return _LIMIT.get() or ONE
+def job_limit() -> int:
+    """Number of processes that a call may use: one by default."""
+    return _LIMIT.get() or DEFAULT_JOBS
 
 
 @contextmanager
-def limited(jobs: int | None) -> Iterator[None]:
-    """Let what is called meanwhile use so many processes; None: as many as before.
+def limit_jobs(jobs: int | None) -> Iterator[None]:
+    """Limit the processes of calls within the block; None: keep the present limit.
 
     Raises OptionError for a number below 1.
     """
@@ -66,7 +66,7 @@ def engine() -> Engine | None:
 
 @contextmanager
 def use_engine(engine: Engine) -> Iterator[None]:
-    """Let ``engine`` do what is called meanwhile, however little it is."""
+    """Let ``engine`` do the work of calls within the block, of any size."""
     token = _ENGINE.set(engine)
     try:
         yield
@@ -75,18 +75,18 @@ def use_engine(engine: Engine) -> Iterator[None]:
 
 
 def useful_jobs(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
-    """Number of processes that pay for so many files of so many bytes in all.
+    """Number of processes that is worthwhile for so many files of so many bytes in all.
 
     ``stored``: they are clips of an MCZ file of that size.
     """
     if (other := engine()) is not None:
-        return max(other.jobs, ONE + 1)
+        return max(other.jobs, DEFAULT_JOBS + 1)
     least = LEAST_STORED if stored else LEAST_BYTES
-    if n_bytes < least or getattr(sys, "frozen", False):  # which has no interpreter to start
-        return ONE
-    return max(ONE, min(in_force(), n_items))
+    if n_bytes < least or getattr(sys, "frozen", False):  # has no interpreter to start
+        return DEFAULT_JOBS
+    return max(DEFAULT_JOBS, min(job_limit(), n_items))
 
 
 def threads_each(jobs: int) -> int:
-    """Threads of each of ``jobs`` processes: all together as many as one would use."""
-    return max(1, threads.in_force() // jobs)
+    """Threads of each of ``jobs`` processes: together as many as one process would use."""
+    return max(1, threads.thread_limit() // jobs)

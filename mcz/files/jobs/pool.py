@@ -1,8 +1,7 @@
 """Processes that work for this one: a function of each item, results in the order of the items.
 
-They are interpreters of their own, started without the caller's main module, so that a script
-needs no guard and threads that run are not forked. A process that dies takes nothing along: what
-it had in hand is done once more by another one.
+They are separate interpreters, started without the caller's main module, so that a script needs no
+guard and running threads are not forked. If a process dies, its work is repeated by another one.
 
 Messages to a process are a length of 8 bytes and a pickle: first the number of threads and the
 pickled state, then for each call a function and an item. The reply is a flag of success, and the
@@ -29,13 +28,13 @@ from mcz.files.jobs import Answer, Item, Result, engine, threads_each
 from mcz.hints import Hint
 from mcz.model.types import Settings
 
-AHEAD = 2  # items in work or done, for each process: what waits is bounded
+AHEAD = 2  # items in work or done, for each process: a bounded queue
 TRIES = 2
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 
 
 class Pool:
-    """``jobs`` processes that have ``state``; as a context it ends them, whatever they do."""
+    """``jobs`` processes with ``state``; the end of the context ends them at once."""
 
     def __init__(self, jobs: int, state: object = None) -> None:
         self.jobs = jobs
@@ -44,7 +43,7 @@ class Pool:
         )
         self._free: SimpleQueue[Worker | None] = SimpleQueue()
         for _ in range(jobs):
-            self._free.put(None)  # started when there is work for it
+            self._free.put(None)  # started on its first work
         self._threads = ThreadPoolExecutor(jobs)
         self._workers: set[Worker] = set()
         self._closed, self._lock = False, Lock()
@@ -71,7 +70,7 @@ class Pool:
     ) -> Iterator[Answer[Result] | None]:
         """Yield ``function(state, item)`` for each item, in order; for None, None.
 
-        ``function`` is one of a module. Items are taken as they are needed, few at a time.
+        ``function`` is one of a module. Items are read as needed, few at a time.
         """
         waiting: deque[Future[Result] | None] = deque()
         for item in items:
@@ -129,9 +128,9 @@ class Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | ONE_THREAD,
-            **_APART,
+            **_SEPARATE_GROUP,
         )
-        with suppress(OSError):  # it has died already, which the first question finds
+        with suppress(OSError):  # it has died already, as its first request will show
             send(cast(BinaryIO, self.process.stdin), first)
 
     @property
@@ -142,7 +141,7 @@ class Worker:
         return f"exit code {code}" if code >= 0 else f"signal {-code}"
 
     def ask(self, message: bytes) -> bytes | None:
-        """The reply, None where the process has died."""
+        """The reply, None if the process has died."""
         try:
             send(cast(BinaryIO, self.process.stdin), message)
             reply = receive(cast(BinaryIO, self.process.stdout))
@@ -154,7 +153,7 @@ class Worker:
         return reply
 
     def end(self) -> None:
-        """End the process now; nothing that it holds is of use."""
+        """End the process now, without its results."""
         self.process.kill()
         self.process.wait()
         for stream in (self.process.stdin, self.process.stdout):
@@ -162,8 +161,8 @@ class Worker:
                 cast(BinaryIO, stream).close()
 
 
-# An interrupt at the terminal goes to the group in front: the pool ends its processes itself.
-_APART: Settings = (
+# An interrupt at the terminal goes to the foreground group: the pool ends its processes itself.
+_SEPARATE_GROUP: Settings = (
     {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
     if os.name == "nt"
     else {"process_group": 0}
@@ -177,11 +176,11 @@ def answers(
     jobs: int,
     state: object = None,
 ) -> Iterator[Iterator[Answer[Result] | None]]:
-    """``Pool.in_order`` of a pool for this alone, or of the engine in use."""
+    """``Pool.in_order`` of a pool for this call, or of the engine in use."""
     other = engine()
     if other is not None:
-        with closing(other.in_order(function, items, state)) as found:
-            yield found
+        with closing(other.in_order(function, items, state)) as results:
+            yield results
         return
     with Pool(jobs, state) as pool:
         yield pool.in_order(function, items)
@@ -197,7 +196,7 @@ def send(stream: BinaryIO, message: bytes) -> None:
 
 
 def receive(stream: BinaryIO) -> bytes | None:
-    """The next message, None where the other side has gone."""
+    """The next message, None if the other side has closed."""
     head = stream.read(LENGTH)
     if len(head) < LENGTH:
         return None
@@ -207,25 +206,24 @@ def receive(stream: BinaryIO) -> bytes | None:
 
 
 def main() -> None:
-    """Answer what comes on standard input; whatever prints prints to standard error."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started the pool ends it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends it
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     first = receive(sys.stdin.buffer)
     if first is None:
         return
-    from mcz.model.threads import limited
+    from mcz.model.threads import limit_threads
 
     n_threads, packed = pickle.loads(first)
-    with limited(n_threads):
+    with limit_threads(n_threads):
         state = State(packed)
-        with suppress(BrokenPipeError):  # it was killed, and needs no answer any more
+        with suppress(BrokenPipeError):  # it was killed, and needs no answer
             while (message := receive(sys.stdin.buffer)) is not None:
                 send(replies, _reply_to(state, message))
 
 
 class State:
-    """State of all calls, unpickled on the first, whose error it may be."""
+    """State of all calls, unpickled on the first, which may raise its error."""
 
     def __init__(self, packed: bytes) -> None:
         self._packed: bytes | None = packed
@@ -242,7 +240,7 @@ def _reply_to(state: State, message: bytes) -> bytes:
     try:
         function, item = pickle.loads(message)
         return pickle.dumps((True, function(state(), item)), pickle.HIGHEST_PROTOCOL)
-    except Exception as error:  # whatever it is, the caller gets it
+    except Exception as error:  # the caller gets any error
         return _failure(error)
 
 
@@ -250,6 +248,6 @@ def _failure(error: Exception) -> bytes:
     try:
         packed = pickle.dumps((False, error))
         pickle.loads(packed)
-    except Exception:  # one of a library, that cannot be pickled
+    except Exception:  # an error of a library that cannot be pickled
         packed = pickle.dumps((False, RuntimeError(f"{type(error).__name__}: {error}")))
     return packed

@@ -1,1 +1,1 @@
-"""Frames that come one by one -> a live clip, and back, whatever gets lost on the way."""
+"""Frames that come one by one -> a live clip, and back, with or without losses."""

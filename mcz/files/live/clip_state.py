@@ -1,4 +1,4 @@
-"""A live clip as its reader knows it: what CLIP says, its decoder, the hash of its values.
+"""The state of a live clip in its reader: the facts of CLIP, its decoder, the hash of its values.
 
 SPEC.md, "Open DATA and packets", is normative.
 """
@@ -22,14 +22,21 @@ from mcz.container.chunks import SIGNATURE, Chunk, ChunkType, build_foot
 from mcz.container.directory import ClipRow
 from mcz.container.packets import FRAME
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, MASKS, SegmentHeader, frame_table, parse_mask, parse_table
+from mcz.container.segments import (
+    FRESH,
+    MASKS,
+    SegmentHeader,
+    frame_table,
+    parse_mask,
+    parse_stream_table,
+)
 from mcz.container.source import ByteSource
 from mcz.container.value_hash import ValueDigest
 from mcz.errors import ChecksumError, FormatError, TruncatedError, UnsupportedError
 from mcz.files.reading.signal_info import SignalInfo, check_roles, read_signal
 from mcz.model.motion import Skeleton
+from mcz.model.types import Floats
 
-Floats = NDArray[np.float64]
 Shared = dict[tuple[bytes, bytes], bytes]  # kind and id -> chunk
 
 
@@ -49,14 +56,14 @@ def needed_chunks(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
     if fields.source is not None:
         yield ChunkType.SRCE, fields.source.template
     for signal in fields.signals:
-        with suppress(FormatError):  # it is said when the signal is read
+        with suppress(FormatError):  # reported when the signal is read
             uses = codec_by_id(signal.codec, signal.codec_version, signal.preset).uses
             for id_ in () if uses is None else uses(bytes(signal.header)):
                 yield ChunkType.MODL, id_
 
 
 def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
-    """A clip of which nothing but its CLIP is known; raises FormatError."""
+    """A clip from its CLIP alone; raises FormatError."""
     if not fields.name or not fields.signals:
         raise FormatError("a clip without a name or a signal", where=f"chunk {chunk.label}")
     check_roles(fields.signals, f"chunk {chunk.label}")
@@ -68,8 +75,7 @@ def begin_clip(
 ) -> ClipState | None:
     """Return a decoder of the clip that begins; None for a codec that needs all frames.
 
-    ``head`` is HEAD, ``shared`` the chunks before the clip. Raises FormatError where the clip needs
-    one that is not there.
+    ``head`` is HEAD, ``shared`` the chunks before the clip. Raises FormatError for a missing one.
     """
     container = Container(ByteSource(io.BytesIO(opening(head, shared, fields) + build_foot(0, 0))))
     skeleton = container.skeleton(row.skeleton)
@@ -77,7 +83,7 @@ def begin_clip(
     motion = fields.signals[0]
     shown = range(motion.skip, motion.skip + fields.n_frames)
     motion.skip = motion.spare = 0
-    nothing = replace(row, n_frames=0, segments=[])  # it is not known what will come
+    nothing = replace(row, n_frames=0, segments=[])  # its later parts are unknown
     info = read_signal(container, nothing, fields, 0, skeleton, rate)
     one = (info.counts.n_groups, info.counts.n_resolutions, info.layout.samples_per_frame)
     if info.codec.follow is None or one != (1, 1, 1):
@@ -88,7 +94,7 @@ def begin_clip(
 
 
 def opening(head: bytes, shared: Shared, fields: payloads.Clip) -> bytes:
-    """A file as far as the clip with these ``fields``: what it needs, and no more."""
+    """A file up to the clip with these ``fields``: only the chunks that it needs."""
     needed = [shared[key] for key in needed_chunks(fields) if key in shared]
     return b"".join([SIGNATURE, head, *needed])
 
@@ -96,7 +102,7 @@ def opening(head: bytes, shared: Shared, fields: payloads.Clip) -> bytes:
 class ClipState:
     """A clip that is decoded frame by frame.
 
-    ``shown`` are the stored frames that the clip shows, None where those are all.
+    ``shown`` are the stored frames that the clip shows, None for all.
     """
 
     def __init__(
@@ -115,7 +121,7 @@ class ClipState:
     ) -> tuple[bytes, NDArray[np.bool_] | None]:
         """The codec's stream of a segment of one frame, and its mask, (n_channels,).
 
-        ``packet`` is the kind of packet that it came in, 0 for a closed DATA. Raises FormatError,
+        ``packet`` is the kind of its packet, 0 for a closed DATA. Raises FormatError,
         UnsupportedError for a segment of several frames.
         """
         if packet == FRAME:
@@ -129,7 +135,7 @@ class ClipState:
                 where=self._where,
             )
         try:
-            table = parse_table(payload, self.info.counts)
+            table = parse_stream_table(payload, self.info.counts)
         except TruncatedError as error:
             raise FormatError(str(error), where=where) from None
         if table.payload_size != len(payload):
@@ -155,4 +161,4 @@ class ClipState:
                 f"{len(hashes)} hashes of {self.n_signals} signals", where=self._where
             )
         if self._digest.digest() != hashes[0]:
-            raise ChecksumError("its frames are not those it was closed with", where=self._where)
+            raise ChecksumError("its frames differ from the hash of its end", where=self._where)

@@ -1,7 +1,7 @@
-"""The frames of a live clip in order, with something in the place of those that did not come.
+"""The frames of a live clip in order, with substitutes for missing ones.
 
-SPEC.md, "Live streams with losses", has the limits; what is shown in place of a lost frame is a
-reader's choice.
+SPEC.md, "Live streams with losses", has the limits; the substitute of a lost frame is a reader's
+choice.
 """
 
 from __future__ import annotations
@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from mcz.errors import LostFrameError
 from mcz.model.text_format import brief
-from mcz.model.types import Values
+from mcz.model.types import Floats, Values
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 State = Literal["decoded", "concealed", "missing"]
 Lost = Literal["refuse", "missing", "hold", "linear"]
@@ -26,11 +25,11 @@ LOST = ("refuse", "missing", "hold", "linear")
 
 @dataclass(frozen=True, slots=True)
 class LiveFrame:
-    """A frame of a clip, from 0: its values and which are valid, both (n_channels,).
+    """A frame of a clip, from 0: its values and their validity, both (n_channels,).
 
-    ``values`` are NaN where invalid. ``state`` says whether they are what the file holds
-    (``decoded``), were made up because the frame did not come or could not be decoded
-    (``concealed``), or are not known at all (``missing``).
+    ``values`` are NaN where invalid. ``state``: they come from the file (``decoded``), are a
+    substitute for a frame that is lost or could not be decoded (``concealed``), or are unknown
+    (``missing``).
     """
 
     number: int
@@ -42,11 +41,11 @@ class LiveFrame:
 
 
 class Concealer:
-    """Puts frames in order; ``lost`` says what is shown for those that did not come.
+    """Puts frames in order; ``lost`` decides the substitute of missing ones.
 
-    ``shown`` are the stored frames that the clip shows, None where those are all; what comes in
-    counts stored frames, what goes out those that are shown. ``due`` is the stored frame that comes
-    next, None as long as nothing is known. ``spend`` is asked whether so many may be made up.
+    ``shown`` are the stored frames that the clip shows, None for all; input counts stored frames,
+    output the shown ones. ``due`` is the stored frame that comes next, None as long as it is
+    unknown. ``spend`` decides whether so many may be concealed.
     """
 
     def __init__(
@@ -65,10 +64,10 @@ class Concealer:
         self._nothing = np.full(n_channels, np.nan), np.zeros(n_channels, np.bool_)
         self._last: tuple[Floats, Mask] | None = None
         self._owed = 0  # frames before the one due that wait for the next decoded one
-        self.is_whole = not join  # every frame so far that is shown was decoded
+        self.is_whole = not join  # every shown frame up to now was decoded
 
     def give(self, number: int, values: Floats, mask: Mask | None) -> Iterator[LiveFrame]:
-        """A frame was decoded, and those before it that are due were not."""
+        """Add a decoded frame; earlier ones that are due were not decoded."""
         yield from self.reach(number)
         assert self.due is not None
         if number < self.due or (self._stop is not None and number >= self._stop):
@@ -81,7 +80,7 @@ class Concealer:
         yield LiveFrame(number - self._first, shown, valid)  # LIVE-02
 
     def reach(self, number: int) -> Iterator[LiveFrame]:
-        """No frame before ``number`` will come."""
+        """Note that no frame before ``number`` will come."""
         if self.due is None:
             self.due = max(self._first, number)
             self.is_whole = self.due == self._first
@@ -105,7 +104,7 @@ class Concealer:
                 yield self._held(self.due - 1)
 
     def end(self) -> Iterator[LiveFrame]:
-        """Nothing more is decoded that frames could lie between."""
+        """Note that no frame follows the missing ones."""
         owed, self._owed = self._owed, 0
         for number in range((self.due or 0) - owed, self.due or 0):
             yield self._held(number)

@@ -43,13 +43,13 @@ def stream_encode(
     metadata: Mapping[str, str] = MappingProxyType({}),
     repeat: int | None = None,
 ) -> Iterator[bytes]:
-    """The bytes of a live clip: first what precedes the frames, then those of each as it comes.
+    """The bytes of a live clip: first what precedes the frames, then each frame as it comes.
 
     ``skeleton`` may be names instead, of markers or of their coordinates (see ``markers``).
-    ``frames`` gives rows in source units, (n_channels,), NaN where invalid; a mapping among them
-    changes parameters of the codec from the next group of frames on. The bytes of a frame are given
-    before the next is asked for. Where ``frames`` raises, so does this, and the stream has no end.
-    ``repeat`` and what is raised: see ``LiveWriter``.
+    ``frames`` yields rows in source units, (n_channels,), NaN where invalid; a mapping among them
+    changes parameters of the codec from the next group of frames on. The bytes of a frame are
+    yielded before the next is read. If ``frames`` raises, so does this, and the stream has no end.
+    ``repeat`` and errors: see ``LiveWriter``.
     """
     sink = io.BytesIO()
     known = skeleton if isinstance(skeleton, Skeleton) else markers(skeleton)
@@ -97,11 +97,11 @@ def markers(names: Sequence[str]) -> Skeleton:
     if not names or not all(names):
         raise OptionError("a stream needs names of markers, none of them empty")
     split = [name.rpartition(".") for name in names]
-    found = [(marker, axis.removeprefix("t")) for marker, _, axis in split]
-    if len(names) % 3 == 0 and {axis for _, axis in found} == set(AXES):
-        chosen = [marker for marker, _ in found[::3]]
-        wanted = [(marker, axis) for marker in chosen for axis in AXES]
-        if found != wanted:
+    named_axes = [(marker, axis.removeprefix("t")) for marker, _, axis in split]
+    if len(names) % 3 == 0 and {axis for _, axis in named_axes} == set(AXES):
+        chosen = [marker for marker, _ in named_axes[::3]]
+        expected = [(marker, axis) for marker in chosen for axis in AXES]
+        if named_axes != expected:
             raise OptionError(
                 f"{', '.join(names[:3])}, ... name coordinates, but not x, y and z of each marker "
                 "in turn"
@@ -119,18 +119,18 @@ def stream_decode(
     post_filter: bool = False,
     rate: Fraction | None = None,
 ) -> LiveReader:
-    """The frames of the MCZ file that ``source`` gives, each as soon as its bytes are there.
+    """The frames of the MCZ file in ``source``, each as soon as its bytes are there.
 
-    ``source`` is a binary stream, bytes, or an iterable of such. ``lost`` says what is done where
-    frames do not come, or come damaged, or need such a one: ``refuse`` raises at the first fault,
-    as ``live_frames`` does; ``missing`` gives NaN, ``hold`` the last decoded values, ``linear``
-    those on a straight line to the next decoded ones, when these have come. Frames before the first
-    decoded one are missing. With ``join`` the stream may begin anywhere, and gives frames from the
-    first on that can be numbered. ``post_filter``: positions go through the post filter, which is
-    12 frames late; ``rate`` is the frame rate of a clip that does not know its own.
+    ``source`` is a binary stream, bytes, or an iterable of such. ``lost`` decides about frames that
+    do not come, come damaged, or need such a one: ``refuse`` raises at the first fault, as
+    ``live_frames``; ``missing`` gives NaN, ``hold`` the last decoded values, ``linear`` a straight
+    line to the next decoded ones, when these have come. Frames before the first decoded one are
+    missing. With ``join`` the stream may begin anywhere, and frames start with the first one whose
+    number is known. ``post_filter``: positions go through the post filter, with a delay of 12
+    frames; ``rate`` is the frame rate of a clip that states none.
 
-    Where ``lost`` is not ``refuse``, FormatError is raised where a clip cannot be read at all, and
-    ChecksumError where all of its frames came and are not those that it was closed with.
+    With ``lost`` other than ``refuse``, FormatError is raised where a clip cannot be read at all,
+    and ChecksumError where all of its frames came and differ from its hash.
     """
     if lost not in LOST:
         raise OptionError(f"lost is {lost!r}, not one of {', '.join(LOST)}")
@@ -150,7 +150,7 @@ def _stream_of(source: object) -> Any:
 class LiveReader:
     """Iterates over the ``LiveFrame`` of a stream.
 
-    ``summary`` says what came so far, ``clip`` of which clip the last frame is, None before.
+    ``summary`` counts the input up to now, ``clip`` is the clip of the last frame, None before.
     """
 
     def __init__(
@@ -230,7 +230,7 @@ class _PieceStream:
         self._pieces = iter(pieces)
 
     def read1(self, size: int) -> bytes:
-        """The next piece that is not empty, however large; empty at the end."""
+        """The next piece that is not empty, of any size; empty at the end."""
         for piece in self._pieces:
             if not isinstance(piece, bytes | bytearray | memoryview):
                 raise OptionError(f"cannot read from {piece!r}: not bytes")

@@ -1,4 +1,4 @@
-"""Reading a live stream of which parts are lost: what came is decoded, what did not is said.
+"""Reading a live stream with losses: received frames are decoded, missing ones reported.
 
 SPEC.md, "Live streams with losses", is normative.
 """
@@ -19,7 +19,7 @@ from mcz.container.directory import parse_head
 from mcz.container.grammar import ChunkEvent, Fault, FootEvent, PacketEvent
 from mcz.container.limits import BASE, check
 from mcz.container.parser_drivers import Stream, repeated_chunks
-from mcz.container.segments import FRESH, SegmentHeader, parse_header
+from mcz.container.segments import FRESH, SegmentHeader, parse_segment_header
 from mcz.container.tolerant_parser import TolerantParser
 from mcz.errors import (
     ChecksumError,
@@ -34,7 +34,7 @@ from mcz.files.live.concealment import Concealer, LiveFrame, Lost
 from mcz.model.schema import MAX_COUNT, parse
 from mcz.model.text_format import brief
 
-MOST_MADE_UP = 65_536  # frames in place of lost ones, and one more for every byte that came
+MOST_MADE_UP = 65_536  # frames in place of lost ones, and one more for every received byte
 MOST_REMARKS = 20
 
 
@@ -42,11 +42,10 @@ MOST_REMARKS = 20
 class StreamSummary:
     """Result of a stream, in frames and bytes.
 
-    ``skipped`` frames did not come and were not made up either, since they were too many.
-    ``payload_bytes`` are those of the codec's streams, the others of ``stream_bytes`` frame them.
-    ``is_cut``: the stream ended before its file did. ``is_checked``: the value hash of each
-    clip was found right; it cannot be compared where frames are missing. ``remarks`` tell of the
-    first faults, of which there were ``n_faults``.
+    ``skipped`` frames did not come and were too many to conceal. ``payload_bytes`` are those of the
+    codec's streams, the others of ``stream_bytes`` frame them. ``is_cut``: the stream ended before
+    its file did. ``is_checked``: the value hash of each clip was right; it cannot be compared where
+    frames are missing. ``remarks`` describe the first of ``n_faults`` faults.
     """
 
     decoded: int = 0
@@ -72,12 +71,12 @@ class StreamSummary:
 
 
 class FramesWithLosses:
-    """The frames of a stream that survives losses; ``clip`` is the one that the last is of."""
+    """The frames of a stream with losses; ``clip`` is the clip of the last one."""
 
     def __init__(self, stream: BinaryIO, lost: Lost, join: bool, summary: StreamSummary) -> None:
         self._stream, self._parser = Stream(stream), TolerantParser()
         self._lost, self._summary = lost, summary
-        self._joining = join  # until a frame has come whose number is known
+        self._joining = join  # until a frame with a known number has come
         self._head, self._shared = b"", Shared()
         self._course: _ClipCourse | None = None
         self._least: int | None = None  # no frame of the open DATA comes before
@@ -90,8 +89,8 @@ class FramesWithLosses:
         return self._stream.size
 
     def frames(self) -> Iterator[LiveFrame]:
-        """All frames that can be told; raises FormatError where there is no going on."""
-        is_cut, cuts = True, list[Fault]()  # those are no faults where nothing follows
+        """All frames with a known place; raises FormatError where reading cannot continue."""
+        is_cut, cuts = True, list[Fault]()  # not faults if nothing follows
         for event in self._stream.events(self._parser):
             if isinstance(event, Fault) and isinstance(event.error, TruncatedError):
                 if self._lost == "refuse":
@@ -101,28 +100,28 @@ class FramesWithLosses:
             is_cut = not isinstance(event, FootEvent)  # LIVE-11
             while cuts:
                 self._note(cuts.pop())
-            found = event.event if isinstance(event, Fault) else event
+            parsed = event.event if isinstance(event, Fault) else event
             if isinstance(event, Fault):
                 self._note(event)
             elif isinstance(event, PacketEvent):
                 yield from self._packet(event)
-            if isinstance(found, ChunkEvent):
-                yield from self._chunk(found)
-            elif isinstance(found, FootEvent):
+            if isinstance(parsed, ChunkEvent):
+                yield from self._chunk(parsed)
+            elif isinstance(parsed, FootEvent):
                 yield from self._leave("the file ended")
         yield from self._leave("the stream ended")
         self._summary.is_cut = is_cut
         self._summary.is_checked = bool(self._all_checked)
 
     def _note(self, fault: Fault) -> None:
-        """Note what is not whole, or not right; that a chunk is not in its place means nothing."""
+        """Note a damaged or wrong chunk; a chunk at a wrong place is no fault."""
         if isinstance(fault.error, UnsupportedError) or self._parser.is_done:
             raise fault.error
         if not fault.state:
             self._fault(f"at {fault.offset}: {fault.error}")
 
     def _fault(self, text: str) -> None:
-        if self._joining:  # what lies before the place where one joins is no loss
+        if self._joining:  # losses before the place of joining do not count
             return
         self._summary.fault(text)
         if self._lost == "refuse":
@@ -172,7 +171,7 @@ class FramesWithLosses:
             yield from self._chunk(inner)
 
     def _begin(self, event: ChunkEvent) -> Iterator[LiveFrame]:
-        """A clip begins, or is the one that has begun and is told once more."""
+        """Begin a clip, unless it is the open one repeated."""
         if self._course is not None and self._course.opening == event.data:
             return
         yield from self._leave("another clip began")
@@ -219,7 +218,7 @@ class FramesWithLosses:
             self._all_checked = False
 
     def _leave(self, why: str) -> Iterator[LiveFrame]:
-        """Give up the clip that has begun, whose end did not come."""
+        """Give up the open clip, whose end did not come."""
         course, self._course = self._course, None
         if course is not None:
             yield from course.frames.end()
@@ -244,7 +243,7 @@ class FramesWithLosses:
 
     def _segment(self, course: _ClipCourse, payload: bytes) -> Iterator[LiveFrame]:
         try:
-            header, _ = parse_header(payload)
+            header, _ = parse_segment_header(payload)
         except FormatError as error:
             self._fault(str(error))
             return
@@ -267,7 +266,7 @@ class FramesWithLosses:
             if not isinstance(error, LostFrameError) or self._lost == "refuse":
                 self._fault(f"frame {number}: {error}")
         if values is None:
-            for due in (number, number + 1):  # the first frame that is known of counts, too
+            for due in (number, number + 1):  # the first known frame counts too
                 yield from frames.reach(due)
             return
         for frame in frames.give(number, values, mask):
@@ -278,7 +277,7 @@ class FramesWithLosses:
 
 @dataclass(slots=True)
 class _ClipCourse:
-    """A clip that has begun: what decodes it, and what puts its frames in order."""
+    """A clip that has begun: its decoder, and the order of its frames."""
 
     followed: ClipState
     opening: bytes  # its CLIP
@@ -286,9 +285,9 @@ class _ClipCourse:
     at: int = 0  # the frame that the decoder expects
 
     def decode(self, number: int, stream: bytes, fresh: bool) -> NDArray[np.float64]:
-        """The values of a frame; raises FormatError, and takes it for one that was lost then."""
+        """The values of a frame; raises FormatError, and counts it as lost then."""
         if number < self.at and not fresh:
-            raise LostFrameError(f"frame {number} came behind frame {self.at - 1}")
+            raise LostFrameError(f"frame {number} came after frame {self.at - 1}")
         if number > self.at:
             self.followed.decoder.skip(number - self.at)
         self.at = number + 1

@@ -1,7 +1,7 @@
 """Reading a clip while it is being written, strictly.
 
-SPEC.md, "Open DATA and packets", is normative. ``reader_with_losses.py`` goes on where frames are
-lost.
+SPEC.md, "Open DATA and packets", is normative. ``reader_with_losses.py`` continues after lost
+frames.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ from mcz.model.schema import parse
 from mcz.model.types import Values
 
 Frame = tuple[int, Values, NDArray[np.bool_]]
-SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)  # what clips refer to
+SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)  # chunks that clips refer to
 
 
 def live_frames(stream: BinaryIO) -> Iterator[Frame]:
-    """The frames of the MCZ file that a binary stream gives, each as soon as its bytes are there.
+    """The frames of the MCZ file in a binary stream, each as soon as its bytes are there.
 
-    Yields the number of the frame in its clip, from 0, its values and which of them are valid, both
+    Yields the number of the frame in its clip, from 0, its values and their validity, both
     (n_channels,) of the motion signal, the values NaN where invalid. A clip whose codec does not
     decode frame by frame comes when it has ended. Raises FormatError at the first fault, after all
-    frames before it: TruncatedError where the stream ends too early, ChecksumError where the
-    frames of a clip were not those that it was closed with. ``stream_decode`` goes on instead.
+    frames before it: TruncatedError where the stream ends too early, ChecksumError where the frames
+    of a clip differ from its hash. ``stream_decode`` can continue instead.
     """
     if not hasattr(stream, "read"):
         raise OptionError(f"cannot read from {stream!r}: not a binary stream")
-    found = StrictFrames(stream, StreamSummary()).frames()
-    return ((frame.number, frame.values, frame.valid) for frame in found)
+    frames = StrictFrames(stream, StreamSummary()).frames()
+    return ((frame.number, frame.values, frame.valid) for frame in frames)
 
 
 class StrictFrames:
-    """The frames of a stream; ``clip`` is the one that the last is of."""
+    """The frames of a stream; ``clip`` is the clip of the last one."""
 
     def __init__(self, stream: BinaryIO, summary: StreamSummary) -> None:
         self._stream, self.summary = Stream(stream), summary

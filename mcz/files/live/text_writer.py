@@ -25,7 +25,7 @@ NOTE = "coded live, frame by frame, from {format} text, which was not kept"
 class LiveText:
     """A motion that arrives as text, and ``writer``, which writes it.
 
-    ``remarks`` are what the clip cannot say, all of them known when ``push_all`` has returned.
+    ``remarks`` list facts that the clip cannot hold, complete when ``push_all`` has returned.
     """
 
     def __init__(self, arriving: Arriving, writer: LiveWriter, remarks: tuple[str, ...]) -> None:
@@ -35,8 +35,8 @@ class LiveText:
     def push_all(self) -> None:
         """Write each frame before the next line is read.
 
-        Raises SourceError at text that is none of the format, at a last line without a line end,
-        and where fewer frames came than are declared; the clip has all frames before that.
+        Raises SourceError for malformed text, for a last line without a line end, and for fewer
+        frames than declared; the clip has all frames before that.
         """
         due, is_renumbered = self._open_source.first_number, False
         for number, values in self._open_source.frames:
@@ -65,18 +65,18 @@ def begin_live(
     options: SourceOptions,
     encoding: EncodingOptions,
 ) -> LiveText:
-    """A live clip, up to its first frame, of the motion that ``lines`` spell.
+    """A live clip, up to its first frame, of the motion in ``lines``.
 
     The caller uses its writer as a context manager. ``source_format`` is ``bvh`` or ``amc``; an AMC
-    needs the ``skeleton`` of ``options``, its ASF. Raises SourceError at text that is none of the
-    format, and otherwise as ``LiveWriter`` does.
+    needs the ``skeleton`` of ``options``, its ASF. Raises SourceError for malformed text, and
+    otherwise as ``LiveWriter``.
     """
     arriving, base = _open_source(_check_lines(lines), source_format, options)
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
     metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
     if base is not None:
-        found = (how_given(base), metadata.get(SKELETON_NOTE, ""))
-        metadata[SKELETON_NOTE] = "; ".join(filter(None, found))
+        choice = (how_given(base), metadata.get(SKELETON_NOTE, ""))
+        metadata[SKELETON_NOTE] = "; ".join(filter(None, choice))
     writer = LiveWriter(
         sink,
         facing(in_unit(arriving.skeleton, options.unit), *options.axes),
@@ -92,7 +92,7 @@ def begin_live(
 
 
 def _check_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
-    """Lines as they come; raises SourceError for a last one that may have been cut."""
+    """Lines as they come; raises SourceError for a last one that may be truncated."""
     for number, line in enumerate(lines, 1):
         if not line.endswith(b"\n") and line.strip():
             raise SourceError(f"line {number} has no line end: the source was cut off")
@@ -102,17 +102,16 @@ def _check_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
 def _open_source(
     lines: Iterable[bytes], source_format: str, options: SourceOptions
 ) -> tuple[Arriving, Skeleton | None]:
-    """Open a source that arrives line by line, and the skeleton that it needs."""
-    found = FORMATS.get(source_format)
-    if found is None or found.arrive is None:
+    text_format = FORMATS.get(source_format)
+    if text_format is None or text_format.arrive is None:
         able = ", ".join(f.name for f in FORMATS.values() if f.arrive is not None)
         raise OptionError(f"format {source_format!r} cannot come line by line; these can: {able}")
     base = None
-    if found.wants_skeleton:
+    if text_format.wants_skeleton:
         if options.skeleton is None or options.skeleton == NONE:
             raise OptionError(f"{source_format} that comes line by line needs its skeleton file")
         base = in_unit(read_skeleton(options.skeleton), options.unit)
-    arriving: Arriving = found.arrive(iter(lines), base)
+    arriving: Arriving = text_format.arrive(iter(lines), base)
     return arriving, base
 
 
@@ -126,18 +125,18 @@ def _remarks_on(arriving: Arriving, options: SourceOptions) -> tuple[str, ...]:
 def codes_live(codec: str, params: Params) -> bool:
     """Return True if the codec of that name, with these parameters, codes frame by frame.
 
-    Raises OptionError for a codec or a parameter that there is not.
+    Raises OptionError for an unknown codec or parameter.
     """
-    found = codec_by_name(codec)
-    if found.live is None:
+    chosen = codec_by_name(codec)
+    if chosen.live is None:
         return False
-    options = found.options(params)
-    return all(options[name] == value for name, value in found.live_options.items())
+    options = chosen.options(params)
+    return all(options[name] == value for name, value in chosen.live_options.items())
 
 
 def suffix_of(data: bytes, format_name: str | None) -> str:
-    """The suffix of files of a source format, or of what ``data`` looks like; OptionError."""
-    found = likely_formats(data) if format_name is None else (format_name,)
-    if not found:
+    """The suffix of files of a source format, or the likely one of ``data``; OptionError."""
+    formats = likely_formats(data) if format_name is None else (format_name,)
+    if not formats:
         raise OptionError("it looks like no known format; say which it is")
-    return FORMATS[found[0]].suffix
+    return FORMATS[formats[0]].suffix

@@ -20,7 +20,7 @@ from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
 from mcz.container.chunks import REPEATED, ChunkFlag, ChunkType
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_mask
-from mcz.container.time_base import ComingGaps
+from mcz.container.time_base import MissingRunCounter
 from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
@@ -42,12 +42,11 @@ from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.model.motion import Motion, Signal, Skeleton
 from mcz.model.text_format import brief
-from mcz.model.types import Params
+from mcz.model.types import Floats, Params
 
-MOST_OVER = 1.05  # of a rate: that it is held
-REPEATED_SHARE = 0.1  # of a rate, for what is repeated to those who join
+MOST_OVER = 1.05  # of a rate that counts as kept
+REPEATED_SHARE = 0.1  # of a rate, for headers repeated for joining readers
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
@@ -56,8 +55,8 @@ class LiveTraffic:
     """The bytes of a live clip on the wire.
 
     ``total`` bytes were sent, ``frames`` of them with frames, ``coded`` of these as streams of the
-    codec: the others are their framing, masks and repeated clip headers. ``asked`` is the bit rate
-    that the codec was to hold at last, in kbit/s, None without one; ``seconds`` are those of the
+    codec: the others are their framing, masks and repeated clip headers. ``asked`` is the last
+    target bit rate of the codec, in kbit/s, None without one; ``seconds`` is the duration of the
     frames, None where the frame rate is unknown.
     """
 
@@ -71,32 +70,32 @@ class LiveTraffic:
 
     @property
     def is_held(self) -> bool:
-        """False where frames take more than was asked for, and no coarser step would help."""
+        """False where frames take more than the target, and no coarser step would help."""
         if self.asked is None or not self.seconds:
             return True
         return self.frames / 125 / self.seconds <= MOST_OVER * self.asked
 
 
 class LiveWriter:
-    """Writes one clip to ``sink`` frame by frame; nothing is sought, so a pipe will do.
+    """Writes one clip to ``sink`` frame by frame, without seeking, so a pipe will do.
 
-    ``skeleton`` is that of the frames that are pushed; a codec of positions of points codes those,
-    under a skeleton of markers. ``codec`` names one that works live, ``params`` are its parameters;
+    ``skeleton`` belongs to the pushed frames; a codec of positions of points codes those, under a
+    skeleton of markers. ``codec`` names one that works live, ``params`` are its parameters;
     ``metadata`` are those of the clip, ``first_number`` is the number of its first frame, ``base``
-    the skeleton that its own was derived from where that says so. Each frame's bytes are
-    written in one call, and flushed. Every ``repeat``-th frame that starts fresh, but the first,
-    is preceded by what a reader needs who joins there (0: none is; None: each, with a bit rate as
-    many as take a tenth of it). Raises OptionError for a codec that cannot, for a bad parameter or
-    one that needs all frames, MotionError for a skeleton without channels.
+    the id of the skeleton that its own was derived from. Each frame's bytes are written in one
+    call, and flushed. Every ``repeat``-th frame that starts fresh, except the first, is preceded by
+    the headers that a joining reader needs (0: none is; None: each, with a bit rate as many as take
+    a tenth of it). Raises OptionError for a codec that cannot, for a bad parameter or one that
+    needs all frames, MotionError for a skeleton without channels.
 
-    ``traffic`` counts what was sent. ``entry`` is where, in the bytes that are being written or
-    were last, a reader can join, who has those of the beginning or finds them repeated there; None
-    where that is nowhere.
+    ``traffic`` counts the sent bytes. ``entry`` is the offset, in the bytes that are being written
+    or were last, where a reader can join that has those of the beginning or finds them repeated
+    there; None if there is none.
 
     As a context manager it closes the clip, also where an interrupt (Ctrl-C) ends the block, as a
     recording is ended. Any other exception aborts it: the file stops without CEND and FOOT, and a
-    reader raises TruncatedError behind the last frame. An interrupt amid a frame waits until that
-    is written; a second one leaves the clip cut off.
+    reader raises TruncatedError after the last frame. An interrupt during a frame waits until that
+    is written; a second one truncates the clip.
     """
 
     def __init__(
@@ -116,7 +115,7 @@ class LiveWriter:
     ) -> None:
         if repeat is not None and repeat < 0:
             raise OptionError(f"repeat is {repeat}, not 0 or more")
-        self.n_frames, self._gaps = 0, ComingGaps(first_number)
+        self.n_frames, self._gaps = 0, MissingRunCounter(first_number)
         self.entry: int | None = None
         self._repeat, self._n_fresh, self._changed = repeat, 0, set[str]()
         self._repeated_at = 0  # frame
@@ -175,9 +174,10 @@ class LiveWriter:
     def push(self, values: Floats) -> Floats:
         """Write the next frame, (n_channels,) in source units, NaN where invalid.
 
-        Returns what a reader will have, NaN where invalid. Raises MotionError for values that the
-        codec cannot hold, LimitError for a frame too large for a packet; nothing is written then,
-        and after a LimitError the clip can only be closed: the codec has gone on without its file.
+        Returns the values that a reader will have, NaN where invalid. Raises MotionError for values
+        that the codec cannot hold, LimitError for a frame too large for a packet; nothing is
+        written then, and after a LimitError the clip can only be closed: the state of the codec is
+        ahead of the file.
         """
         if not self._is_open or self._is_stuck:
             raise MotionError(
@@ -194,12 +194,12 @@ class LiveWriter:
         with defer_sigint():
             try:
                 return self._push(row)
-            except KeyboardInterrupt:  # a second one: what was sent ends amid a frame
+            except KeyboardInterrupt:  # a second one: the stream ends within a frame
                 self._is_open = False
                 raise
 
     def miss(self, n_frames: int = 1) -> None:
-        """Leave out the numbers of so many frames behind the last one; OptionError before one."""
+        """Skip the numbers of so many frames after the last one; OptionError before the first."""
         self._gaps.miss(n_frames)
 
     def _push(self, row: Floats) -> Floats:
@@ -225,7 +225,7 @@ class LiveWriter:
         return decoded if valid is None else np.where(valid, decoded, np.nan)
 
     def _count(self, n_bytes: int, n_coded: int) -> None:
-        """Take in what a frame took; the codec pays for what preceded the first one, too."""
+        """Count the bytes of a frame; the codec's budget includes headers before the first."""
         traffic = self.traffic
         if traffic.asked is not None:
             self._encoder.charge(n_bytes if self.n_frames else traffic.total)
@@ -235,7 +235,7 @@ class LiveWriter:
             traffic.seconds = float((self.n_frames + 1) / self._rate)
 
     def change(self, /, **params: object) -> None:
-        """Let parameters of the codec have other values from the next group of frames on.
+        """Change parameters of the codec from the next group of frames on.
 
         Raises OptionError for one that cannot change, or a bad value; nothing changes then.
         """
@@ -267,9 +267,9 @@ class LiveWriter:
         self._mask, self._was_masked = mask, self._was_masked or bool(mask)
 
     def _begin_data(self, fresh: bool) -> None:
-        """Open a DATA, from time to time behind a copy of what is needed to read it.
+        """Open a DATA, from time to time after a copy of the headers needed to read it.
 
-        One that does not start ``fresh`` goes on behind a heartbeat, and nobody can join there.
+        One that does not start ``fresh`` follows a heartbeat, and no reader can join there.
         """
         if fresh:
             self.entry = self._outlet.size
@@ -281,7 +281,7 @@ class LiveWriter:
         self._has_data, self._was_masked = True, False
 
     def _repeats(self) -> bool:
-        """True where the fresh frame that is due follows what a reader needs who joins."""
+        """True where the fresh frame that is due follows repeated headers."""
         asked = self.traffic.asked
         if self._repeat is not None:
             return self._repeat > 0 and (self._n_fresh - 1) % self._repeat == 0
@@ -293,7 +293,7 @@ class LiveWriter:
     def heartbeat(self) -> None:
         """Write an open DATA without a frame, which readers skip.
 
-        It tells who listens with a timeout that the stream goes on while its source is silent.
+        It shows readers with a timeout that the stream continues while its source is silent.
         """
         if not self._is_open or self._is_stuck:
             return
@@ -307,11 +307,11 @@ class LiveWriter:
             self._outlet.send()
 
     def abort(self) -> None:
-        """Leave the clip without an end, so that readers see that it is not whole."""
+        """Leave the clip without an end, so that readers see that it is incomplete."""
         self._is_open = False
 
     def close(self) -> None:
-        """Write what comes behind the frames: hash, quality record, index."""
+        """Write the parts after the frames: hash, quality record, index."""
         with defer_sigint():
             if self._is_open:
                 self._is_open = False
@@ -326,8 +326,8 @@ class LiveWriter:
         if not self.codec.lossless:
             fixed = {k: v for k, v in self.options.items() if k not in self._changed}
             settings = {f"param.{name}": value for name, value in fixed.items()}
-            found = {"codec": self.codec.name, **settings, **self._figures.entries()}
-            stored = with_indices(texts_of(found), self._figures.skeleton)
+            record = {"codec": self.codec.name, **settings, **self._figures.entries()}
+            stored = with_indices(texts_of(record), self._figures.skeleton)
             self._writer.ancillary(CHUNK, quality_payload(stored))
         self._writer.finish()
         self._outlet.send()
@@ -371,7 +371,7 @@ class _Outlet:
         self._traffic.total += self.size
         while self._parts:
             data = b"".join(self._parts)
-            taken = self._sink.write(data)  # a raw stream may take a part alone
+            taken = self._sink.write(data)  # a raw stream may write only a part
             left = b"" if taken is None else data[taken:]
             self._parts = [left] if left else []
         flush = getattr(self._sink, "flush", None)
@@ -381,7 +381,7 @@ class _Outlet:
 
 @contextmanager
 def defer_sigint() -> Iterator[None]:
-    """Let an interrupt (Ctrl-C) wait for the end of the block; a second one does not wait.
+    """Delay an interrupt (Ctrl-C) to the end of the block; a second one does not wait.
 
     Only the main thread is ever interrupted, and only where Python handles the signal.
     """

@@ -1,7 +1,7 @@
 """Queries that select clips, a line of text: ``subject == '05' and n_frames > 500``.
 
-docs/reference/queries.md is normative: grammar, and what a comparison of two values is. Nothing
-here knows clips or files; callers give a function that looks a name up.
+docs/reference/queries.md is normative: grammar, and comparisons of values. This folder does not
+depend on clips or files; callers pass a function that looks a name up.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["Lookup", "Query", "Value"]
 class Query:
     """A query such as ``subject == '05' and n_frames > 500``; see docs/reference/queries.md.
 
-    Raises OptionError, which shows the column, for a text that is none.
+    Raises OptionError, which shows the column, for a malformed text.
     """
 
     def __init__(self, text: str) -> None:
@@ -34,7 +34,7 @@ class Query:
         return f"<Query {shown(self.text)}>"
 
     def __str__(self) -> str:
-        """The same query with no blank and no parenthesis more than it takes."""
+        """The same query with the fewest blanks and parentheses."""
         return printed(self.tree)
 
     @property
@@ -45,13 +45,13 @@ class Query:
     def matches(self, lookup: Lookup) -> bool:
         """Return True if the query is true, not false or unknown, of the values in ``lookup``.
 
-        ``lookup(name)`` gives a text, a number, a truth, or None where the value is missing; a name
-        is looked up only once its part of the query is reached.
+        ``lookup(name)`` returns a text, a number, a truth, or None for a missing value; a name is
+        looked up only when its part of the query is reached.
         """
         return self._test(lookup) is True
 
     def unknown(self, name: str, known: Collection[str]) -> OptionError:
-        """The error that ``name``, one of ``names``, is none of those that are known."""
+        """The error for an unknown ``name``, one of ``names``."""
         at = next(t.at for t in tokens(self.text) if (t.kind, t.raw) == ("name", name))
         near = nearest(name, known)
         hint = f"did you mean {near}?" if near else f"known are {among(sorted(known), None)}"

@@ -1,9 +1,8 @@
 """Trees of queries: their values, their text, and their evaluation for one clip after the other.
 
-A comparison is true, false, or None where it is unknown: a value may be missing. Logic is that of
-SQL: ``not`` of what is unknown is unknown; ``and`` is false where a part is false, ``or`` true
-where one is true, and otherwise unknown where a part is. Parts are asked from left to right, and no
-more of them than it takes.
+A comparison is true, false, or None if unknown: a value may be missing. Logic is as in SQL: ``not``
+of unknown is unknown; ``and`` is false if a part is false, ``or`` true if one is true, and
+otherwise unknown if a part is. Parts are evaluated from left to right, and only as many as needed.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ COMPARISONS: dict[str, Callable[[Any, Any], bool]] = {
 
 
 def as_number(text: str) -> int | float | None:
-    """The number that all of ``text`` reads as, None where it is none or not finite.
+    """The number that ``text`` reads as, None if it is not a finite number.
 
     >>> as_number("05"), as_number("-2.50"), as_number("1e3"), as_number("5 cm")
     (5, -2.5, 1000.0, None)
@@ -60,7 +59,7 @@ def compare(left: Value, sign: str, right: Value) -> bool | None:
         return COMPARISONS[sign](left, right) if same_kind and is_equality(sign) else None
     if isinstance(left, str) != isinstance(right, str):
         left, right = _number(left), _number(right)
-        if left is None or right is None:  # a text that is no number
+        if left is None or right is None:  # a text that is not a number
             return sign == "!=" if is_equality(sign) else None
     return COMPARISONS[sign](left, right)
 
@@ -122,22 +121,22 @@ def _likeness(value: Callable[[Lookup], Value], pattern: str) -> Test:
 
 def _opposite(part: Test) -> Test:
     def test(lookup: Lookup) -> bool | None:
-        found = part(lookup)
-        return None if found is None else not found
+        result = part(lookup)
+        return None if result is None else not result
 
     return test
 
 
 def _until(decisive: bool, parts: Sequence[Test]) -> Test:
-    """The first part that is ``decisive``; without one unknown where a part is, or its opposite."""
+    """The first part that is ``decisive``; otherwise unknown if a part is, or its opposite."""
 
     def test(lookup: Lookup) -> bool | None:
         result: bool | None = not decisive
         for part in parts:
-            found = part(lookup)
-            if found is decisive:
+            answer = part(lookup)
+            if answer is decisive:
                 return decisive
-            if found is None:
+            if answer is None:
                 result = None
         return result
 
@@ -212,7 +211,7 @@ Node = Compare | In | Like | Missing | Not | And | Or
 
 
 def names_in(node: Node | Operand) -> Iterator[str]:
-    """Every name, as often as it occurs, from left to right."""
+    """Every name, with repetitions, from left to right."""
     match node:
         case Name(name):
             yield name
@@ -227,7 +226,7 @@ def names_in(node: Node | Operand) -> Iterator[str]:
 
 
 def printed(node: Node | Operand) -> str:
-    """The text of which the parser makes this tree.
+    """The text that the parser turns into this tree.
 
     >>> printed(Not(And((Missing(Name("subject")), Like(Name("name"), "it's *")))))
     "not (subject is missing and name like 'it\\\\'s *')"
@@ -246,15 +245,17 @@ def printed(node: Node | Operand) -> str:
         case Missing(operand):
             return f"{printed(operand)} is missing"
         case Not(part):
-            return f"not {_nested(part)}"
+            return f"not {_operand_text(part)}"
         case And(parts):
-            return " and ".join(map(_nested, parts))
+            return " and ".join(map(_operand_text, parts))
         case Or(parts):
-            return " or ".join(printed(p) if isinstance(p, And) else _nested(p) for p in parts)
+            return " or ".join(
+                printed(p) if isinstance(p, And) else _operand_text(p) for p in parts
+            )
 
 
-def _nested(part: Node) -> str:
-    """A part that stands beside ``and``, ``or`` or ``not``."""
+def _operand_text(part: Node) -> str:
+    """An operand of ``and``, ``or`` or ``not``."""
     return f"({printed(part)})" if isinstance(part, And | Or) else printed(part)
 
 

@@ -28,7 +28,7 @@ from mcz.files.queries.evaluation import (
 )
 from mcz.model.text_format import shown
 
-DEEPEST = 64  # parentheses and ``not`` inside each other
+DEEPEST = 64  # nested parentheses and ``not``
 CLOSING = {"(": ")", "[": "]"}
 
 
@@ -47,19 +47,19 @@ class _Parser:
         return self.tokens[self.at]
 
     def next(self) -> Token:
-        """The token, and go on; the end stays the end."""
+        """Return the token and advance; the end stays the end."""
         token = self.token
         self.at += token.kind != "end"
         return token
 
     def skip(self, raw: str) -> bool:
-        """Go on behind the word or sign ``raw`` if it is the next."""
-        found = self.token.kind in ("word", "sign") and self.token.raw == raw
-        self.at += found
-        return found
+        """Advance past the word or sign ``raw`` if it is the next."""
+        is_next = self.token.kind in ("word", "sign") and self.token.raw == raw
+        self.at += is_next
+        return is_next
 
     def expected(self, what: str) -> OptionError:
-        """The error that something else stands here."""
+        """The error for another token here."""
         word = self.token.raw.lower()
         hint = f"; write {word}" if self.token.kind == "name" and word in WORDS else ""
         return fault(self.text, self.token.at, f"expected {what}, not {self.token}{hint}")
@@ -67,10 +67,10 @@ class _Parser:
     def query(self) -> Node:
         if self.token.kind == "end":
             raise OptionError("where: the text is empty")
-        found = self.disjunction()
+        node = self.disjunction()
         if self.token.kind != "end":
             raise self.expected("'and', 'or' or the end")
-        return found
+        return node
 
     def disjunction(self) -> Node:
         return self.operation("or", Or, self.conjunction)
@@ -90,16 +90,16 @@ class _Parser:
         if self.depth == DEEPEST:
             raise fault(self.text, self.token.at, f"more than {DEEPEST} levels of ( and not")
         self.depth += 1
-        found = Not(self.part()) if self.skip("not") else self.group()
+        node = Not(self.part()) if self.skip("not") else self.group()
         self.depth -= 1
-        return found
+        return node
 
     def group(self) -> Node:
         self.skip("(")
-        found = self.disjunction()
+        node = self.disjunction()
         if not self.skip(")"):
             raise self.expected("'and', 'or' or )")
-        return found
+        return node
 
     def comparison(self) -> Node:
         left = self.operand()
@@ -109,12 +109,12 @@ class _Parser:
             return self.missing(left)
         denied = self.skip("not")
         if self.skip("in"):
-            found: Node = In(left, self.list())
+            node: Node = In(left, self.list())
         elif self.skip("like"):
-            found = Like(left, self.pattern())
+            node = Like(left, self.pattern())
         else:
             raise self.expected("in or like" if denied else _what_follows(left))
-        return Not(found) if denied else found
+        return Not(node) if denied else node
 
     def compared(self, left: Operand) -> Node:
         sign = self.next()
@@ -127,7 +127,7 @@ class _Parser:
         return Compare(left, sign.raw, right)
 
     def chain(self, sign: Token) -> str:
-        """Suggest how to write a < b < c, of which a < b is already parsed."""
+        """Suggest another form of a < b < c, of which a < b is already parsed."""
         left, right = (self.tokens[self.at - back].raw for back in (3, 1))
         last = self.tokens[self.at + 1].raw or "..."
         return f"{left} {sign.raw} {right} and {right} {self.token.raw} {last}"
@@ -135,7 +135,7 @@ class _Parser:
     def missing(self, left: Operand) -> Node:
         word = self.next()
         if not isinstance(left, Name):
-            raise fault(self.text, word.at, "only what has a name can be missing")
+            raise fault(self.text, word.at, "only a name can be missing")
         present = self.skip("not")
         if not self.skip("missing"):
             raise self.expected("missing" if present else "missing or not missing")
@@ -158,12 +158,12 @@ class _Parser:
         if closing is None:
             raise self.expected("a list such as ('05', '06')")
         self.next()
-        found = [self.literal("a number or a text in quotes")]
+        literals = [self.literal("a number or a text in quotes")]
         while self.skip(","):
-            found.append(self.literal("a number or a text in quotes"))
+            literals.append(self.literal("a number or a text in quotes"))
         if not self.skip(closing):
             raise self.expected(f", or {closing}")
-        return tuple(found)
+        return tuple(literals)
 
     def pattern(self) -> str:
         if self.token.kind != "text":
@@ -180,9 +180,9 @@ def _what_follows(left: Operand) -> str:
 
 
 LONGEST = 4096  # characters of a query
-AROUND = 24  # characters that an error shows on each side
+CONTEXT = 24  # characters that an error shows on each side
 WORDS = frozenset("and or not in like is missing true false".split())
-# What other languages write, and what is written here.
+# Signs of other languages, and their equivalents here.
 FOREIGN = {"=": "==", "<>": "!=", "=>": ">=", "=<": "<=", "&&": "and", "||": "or", "!": "not"}
 
 _TOKEN = re.compile(
@@ -201,7 +201,7 @@ _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 class Token:
     """``kind`` is "name", "word", "text", "number", "sign" or "end"; ``at`` counts from 0.
 
-    ``raw`` is as it is written, ``value`` what it means.
+    ``raw`` is the text, ``value`` its value.
     """
 
     kind: str
@@ -210,23 +210,23 @@ class Token:
     value: str | int | float = ""
 
     def __str__(self) -> str:
-        """As an error names it."""
+        """The name of the token in errors."""
         return "the end" if self.kind == "end" else shown(self.raw)
 
 
 def fault(text: str, at: int, what: str) -> OptionError:
     """The error ``what`` at an offset of a query; it shows the column and the text around it."""
-    before, after = text[max(at - AROUND, 0) : at], text[at : at + AROUND]
-    left = "..." if at > AROUND else ""
-    right = "..." if at + AROUND < len(text) else ""
+    before, after = text[max(at - CONTEXT, 0) : at], text[at : at + CONTEXT]
+    left = "..." if at > CONTEXT else ""
+    right = "..." if at + CONTEXT < len(text) else ""
     place = f"{left}{before}".strip() + " --> " + f"{after}{right}"
     return OptionError(f"where: column {at + 1}: {what} ({place.strip()})")
 
 
 def tokens(text: str) -> Iterator[Token]:
-    """The tokens of ``text``, at last one of kind "end"; raises OptionError."""
+    """The tokens of ``text``, the last one of kind "end"; raises OptionError."""
     if not isinstance(text, str):
-        raise OptionError(f"where: {shown(repr(text))} is no text")
+        raise OptionError(f"where: {shown(repr(text))} is not a text")
     if len(text) > LONGEST:
         raise OptionError(f"where: {len(text)} characters, {LONGEST} at most")
     at = 0

@@ -1,4 +1,4 @@
-"""A clip of an open file: values decoded on demand, in part if that is all that is asked for."""
+"""A clip of an open file: values decoded on demand, in part if only a part is requested."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ from mcz.hints import Hint
 from mcz.kinematics import point_names
 from mcz.model.clock import (
     TIMES,
-    Column,
     Counting,
+    StoredTimes,
     Timeline,
     column_of,
     known_timeline,
     timeline_of,
     times_fault,
-    times_place,
+    times_index,
     unit_of_times,
 )
 from mcz.model.motion import Motion, Signal, Skeleton, Source, joint_columns
@@ -71,10 +71,10 @@ class _OfPoses:
 
 
 class Clip(StoredClip):
-    """One clip; nothing is decoded before it is asked for."""
+    """One clip; it is decoded on demand."""
 
     _repr_html_ = html_of
-    if TYPE_CHECKING:  # as of ``mcz``: only what they need is decoded
+    if TYPE_CHECKING:  # as of ``mcz``: only needed values are decoded
         positions = poses.positions
         rotations = poses.rotations
         root = poses.root
@@ -92,7 +92,7 @@ class Clip(StoredClip):
 
     @property
     def values(self) -> ClipValues:
-        """The motion signal as something to slice: ``clip.values[100:200]`` decodes 100 frames."""
+        """The motion signal for slicing: ``clip.values[100:200]`` decodes 100 frames."""
         return ClipValues(self.read, self.shape)
 
     def read(
@@ -108,11 +108,11 @@ class Clip(StoredClip):
 
         Shape (rows, channels of the joints in the order given), binary64 in source units.
         ``signal`` is one of ``signals`` by index or name; analog samples are in the units of their
-        channels, while ``read_masked`` gives the stored words. ``resolution`` leaves out that many
-        of the finest details; with ``decimate`` only the rows of every 2^resolution-th frame are
-        returned; ``motion`` also gives their numbers. Raises OptionError for a range outside the
-        clip and FormatError for bad bytes; a full read also checks the value hash,
-        as ``mcz.open`` was told.
+        channels, while ``read_masked`` returns the stored words. ``resolution`` leaves out that
+        many of the finest details; with ``decimate`` only the rows of every 2^resolution-th frame
+        are returned; ``motion`` also has their numbers. Raises OptionError for a range outside the
+        clip and FormatError for bad bytes; a full read also checks the value hash, as set by
+        ``mcz.open``.
         """
         signal = self.find_signal(signal)
         values, mask = self.read_masked(frames, joints, resolution, signal=signal)
@@ -134,7 +134,7 @@ class Clip(StoredClip):
         *,
         signal: int | str = 0,
     ) -> Masked:
-        """The numbers as they are stored, those beneath the mask and analog words too; the mask."""
+        """The stored numbers, also of invalid values and analog words; and the mask."""
         info = self._info(self.find_signal(signal))
         start, stop = self.checked_range(frames)
         self._check_resolution(info, resolution)
@@ -178,7 +178,7 @@ class Clip(StoredClip):
             )
 
     def groups_of(self, info: SignalInfo, joints: Joints) -> tuple[tuple[int, ...], list[int]]:
-        """The groups that hold the channels of these joints, and where each is among theirs."""
+        """The groups with the channels of these joints, and the place of each among theirs."""
         if joints is None:
             return groups_of(info.layout, range(info.layout.n_channels))
         if info.channels is not None:
@@ -195,7 +195,7 @@ class Clip(StoredClip):
         self._compare(info, digest.digest())
 
     def check_hash(self, info: SignalInfo, values: Values, mask: NDArray[np.bool_] | None) -> None:
-        """Raise ChecksumError where these are not the values and the mask of a whole signal."""
+        """Raise ChecksumError unless these are the values and the mask of a whole signal."""
         self._compare(info, value_hash(values, mask))
 
     def _compare(self, info: SignalInfo, digest: bytes) -> None:
@@ -212,10 +212,10 @@ class Clip(StoredClip):
     ) -> Motion:
         """The whole clip, or frames a <= f < b of it, as a Motion with its source.
 
-        ``resolution`` leaves out that many of the finest details of the motion, and of every
-        other signal as many as it has. With ``decimate`` only frames a, a + 2^resolution, ... are
-        there, at a frame rate divided by 2^resolution, their numbers in ``frame_numbers``; the
-        source then is left out where its text states the rate.
+        ``resolution`` leaves out that many of the finest details of the motion, and of every other
+        signal as many as it has. With ``decimate`` only frames a, a + 2^resolution, ... are kept,
+        at a frame rate divided by 2^resolution, their numbers in ``frame_numbers``; the source is
+        left out if its text states the rate.
         """
         motion = self._motion(frames, resolution, decimate)
         signals = tuple(s.in_units(self.scaling(n)) for n, s in enumerate(motion.signals))
@@ -272,7 +272,7 @@ class Clip(StoredClip):
         skip = self.signals[0].skip
         frames = range(start + skip, stop + skip, step)
         try:
-            if self._row.skeleton != self._fields.skeleton:  # what salvage has in its place
+            if self._row.skeleton != self._fields.skeleton:  # salvage has replaced it
                 raise FormatError("the names of its skeleton are lost")
             source = read_source(self.container, fields, info, self.signals[0], frames)
         except FormatError as error:
@@ -301,9 +301,9 @@ class Clip(StoredClip):
             return timeline_of(Counting(self.frame_numbers, rate), self.first_time)
         return self.timeline
 
-    def times_column(self) -> Column | None:
-        """The times that stand among the values; None where there are none."""
-        index = times_place(self.signals)
+    def times_column(self) -> StoredTimes | None:
+        """The times among the values; None if there are none."""
+        index = times_index(self.signals)
         if index is None:
             return None
         info = self.signals[index]
@@ -312,15 +312,15 @@ class Clip(StoredClip):
     def preview(self, joints: Joints = None) -> FrameValues:
         """Read the frames that need no decoding of the rest, counted from 0, and their values.
 
-        The values, of shape (frames, channels of the joints), are those that ``read`` gives for
-        these frames where the codec has some that it stores apart (qbc: its marks); otherwise
-        they are its coarsest resolution. Raises OptionError where there is no such thing.
+        The values, of shape (frames, channels of the joints), equal those of ``read`` for these
+        frames if the codec stores some apart (qbc: its marks); otherwise they are its coarsest
+        resolution. Raises OptionError for a codec without either.
         """
         shown = self.previewed(joints)
         return FrameValues(shown.frames, shown.masked())
 
     def previewed(self, joints: Joints = None) -> Preview:
-        """``preview`` with the mask apart, and how far its frames lie from each other."""
+        """``preview`` with a separate mask, and the distance of its frames."""
         info = self.signals[0]
         groups, columns = self.groups_of(info, joints)
         reader = SignalReader(
@@ -371,9 +371,9 @@ class Clip(StoredClip):
     ) -> bytes:
         """The source file, byte for byte (of a lossy clip: like it), or a part of it.
 
-        The arguments are those of ``motion``. What is not the file itself states the frame rate of
-        the clip, where its format can. Raises ChecksumError where a lossless clip does not give
-        back the bytes it was made of.
+        The arguments are those of ``motion``. A changed file states the frame rate of the clip, if
+        its format can. Raises ChecksumError where a lossless clip does not restore its original
+        bytes.
         """
         info = self.source
         if info is None:
@@ -391,7 +391,7 @@ class Clip(StoredClip):
         return data
 
     def gives_file(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
-        """Return whether ``source_bytes`` gives the very file that the clip was made of."""
+        """Return whether ``source_bytes`` returns the original file of the clip."""
         whole = self.checked_range(frames) == (0, self.n_frames) and not resolution
         return whole and all(signal.codec.lossless for signal in self.signals)
 

@@ -1,4 +1,4 @@
-"""The clips of a file, each made when it is asked for by its name, as users write it."""
+"""The clips of a file, each created on access by its name, as users write it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from mcz.files.reading.clip import Clip
 from mcz.model import text_format
 from mcz.model.text_format import nearest
 
-FEW = 8  # names that a message lists
-KEPT = 64
-Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
+MOST_NAMES = 8  # names that a message lists
+KEPT_CLIPS = 64
+Named = Iterable[tuple[str, str]]  # a possible name of a clip, and its own name
 
 
 def find_clip_name(clips: Clips, name: str) -> str:
-    """The name of the clip that ``name`` means; see ``File.only_clip``. Raises OptionError."""
+    """The name of the clip that ``name`` refers to; see ``File.only_clip``. Raises OptionError."""
     matches = matching_clips(clips, name)
     if len(matches) == 1:
         return matches[0]
@@ -32,7 +32,7 @@ def find_clip_name(clips: Clips, name: str) -> str:
 
 
 def names_of(clips: Clips) -> dict[str, set[str]]:
-    """The names that clips may have, as ``matching_clips`` finds it, for who asks for many."""
+    """The possible names of clips, for many calls of ``matching_clips``."""
     known: dict[str, set[str]] = {name: {name} for name in clips}
     for names in _naming_ways(clips):
         clips_of: dict[str, set[str]] = {}
@@ -43,7 +43,7 @@ def names_of(clips: Clips) -> dict[str, set[str]]:
 
 
 def matching_clips(clips: Clips, name: str) -> list[str]:
-    """The names of the clips that ``name`` may mean, sorted."""
+    """The names of the clips that ``name`` may refer to, sorted."""
     if name in clips.rows:
         return [name]
     for names in _naming_ways(clips):
@@ -60,7 +60,7 @@ def _naming_ways(clips: Clips) -> Iterator[Named]:
     yield _last_parts([*names, *others])
     paths = []
     for clip in clips.values():
-        with suppress(FormatError):  # one that is damaged hides no other
+        with suppress(FormatError):  # a damaged one hides no other
             if clip.source is not None:
                 paths.append((clip.source.path, clip.name))
     yield paths
@@ -87,28 +87,28 @@ def _suggestion(clips: Iterable[str], name: str) -> str:
 
 def list_some(names: Iterable[str]) -> str:
     known = list(names)
-    return ", ".join(known[:FEW]) + (" ..." if len(known) > FEW else "")
+    return ", ".join(known[:MOST_NAMES]) + (" ..." if len(known) > MOST_NAMES else "")
 
 
 class Clips(Mapping[str, Clip]):
-    """In file order, found by whatever ``File.only_clip`` takes.
+    """Clips in file order, found by any name that ``File.only_clip`` accepts.
 
-    A clip is the same object as long as anybody has it.
-    Of those that nobody has, the last ``KEPT`` are kept. A clip keeps what was read of it, so that
-    work on all clips of an archive would otherwise hold the whole archive in the end.
+    A clip is the same object while it is referenced. Of unreferenced clips the last ``KEPT_CLIPS``
+    are kept: a clip keeps the parts that were read, so keeping all clips of an archive would keep
+    the whole archive in memory.
     """
 
     def __init__(self, container: Container) -> None:
         self._container = container
-        self.rows: Mapping[str, ClipRow] = container.directory.clips  # by their own names alone
+        self.rows: Mapping[str, ClipRow] = container.directory.clips  # only by their own names
         self.aliases: Mapping[str, tuple[int, bytes]] = container.directory.aliases
         self._alive: WeakValueDictionary[str, Clip] = WeakValueDictionary()
-        self._last: deque[Clip] = deque(maxlen=KEPT)
+        self._last: deque[Clip] = deque(maxlen=KEPT_CLIPS)
 
     __repr__ = text_format.clips_text
 
     def __getitem__(self, name: str) -> Clip:
-        """The clip that ``name`` means; raises UnknownNameError, which suggests a name."""
+        """The clip that ``name`` refers to; raises UnknownNameError, which suggests a name."""
         if not isinstance(name, str):
             raise UnknownNameError(f"{name!r} is not the name of a clip", path=self.file_name)
         if name not in self.rows:
@@ -119,7 +119,7 @@ class Clips(Mapping[str, Clip]):
         clip = self._alive.get(name)
         if clip is None:
             new = Clip(self._container, self.rows[name])
-            clip = self._alive.setdefault(name, new)  # another thread may have made it, too
+            clip = self._alive.setdefault(name, new)  # another thread may have created it too
             self._last.append(clip)
         return clip
 

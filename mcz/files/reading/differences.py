@@ -1,4 +1,4 @@
-"""Differences of two motions beside their numbers: events, parameters, ..."""
+"""Differences of two motions other than of values: events, parameters, metadata, times."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from typing import Any
 import numpy as np
 
 from mcz.files.reading.source_info import recording
-from mcz.model.clock import EXACT, numbers_or_rows
+from mcz.model.clock import TOLERANCE, numbers_or_rows
 from mcz.model.motion import Motion
 from mcz.model.types import JsonObject, Params
 from mcz.sources import FORMATS, arrays_of
 from mcz.sources.c3d.parameters import TEXT, Parameter, Parameters
 from mcz.sources.c3d.recording import Event, parameters_of
 
-# Parameters that say where data lie and which frames there are, which is compared by itself.
-OF_DATA = {"DATA_START", "FRAMES", "LONG_FRAMES", "ACTUAL_START_FIELD", "ACTUAL_END_FIELD"}
-OF_READERS = {"source-note", "skeleton-note", "name-encoding"}
+# Parameters of the place and extent of the data; frames are compared separately.
+LAYOUT = {"DATA_START", "FRAMES", "LONG_FRAMES", "ACTUAL_START_FIELD", "ACTUAL_END_FIELD"}
+READER_METADATA = {"source-note", "skeleton-note", "name-encoding"}
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Something that two motions do not say alike: what each says, or how many of it each has.
+    """A difference: the value in each motion, or the count of things.
 
-    Of things with names or texts: which one alone has, and which are not the same in both.
+    For named things: names only in a, only in b, and in both but different.
     """
 
     what: str
@@ -42,28 +42,28 @@ def document_of(a: Motion, b: Motion) -> list[JsonObject]:
 
 
 def differences(a: Motion, b: Motion) -> list[Difference]:
-    """The differences of ``b`` from ``a`` beside their numbers; raises FormatError on bad bytes."""
-    facts, things = (_facts(a), _facts(b)), (_things(a), _things(b))
-    found = [
+    """The differences of ``b`` from ``a`` other than of values; raises FormatError on bad bytes."""
+    facts, things = (_single_values(a), _single_values(b)), (_collections(a), _collections(b))
+    result = [
         Difference(what, facts[0][what], facts[1][what])
         for what in facts[0]
         if facts[0][what] != facts[1][what]
     ]
     if facts[0]["first frame"] == facts[1]["first frame"]:
-        found += _time_differences(
+        result += _time_differences(
             a, b, is_rate_same=facts[0]["frame rate"] == facts[1]["frame rate"]
         )
     names = [list(side["joints"]) for side in things]
     if sorted(names[0]) == sorted(names[1]) and names[0] != names[1]:
-        found.append(Difference("order of joints", None, None))
-    for one, other in (things, things[::-1]):  # a group that is not there is enough to say
+        result.append(Difference("order of joints", None, None))
+    for one, other in (things, things[::-1]):  # parameters of a missing group are not listed
         groups = other["groups of parameters"]
         both = {key: value for key, value in one["parameters"].items() if key[0] in groups}
         one["parameters"] = {f"{group}:{name}": value for (group, name), value in both.items()}
-    found += filter(None, (_compare(what, things[0][what], things[1][what]) for what in things[0]))
-    if not found and (what := _source_difference(a, b)):
-        found.append(Difference(what, None, None))
-    return found
+    result += filter(None, (_compare(what, things[0][what], things[1][what]) for what in things[0]))
+    if not result and (what := _source_difference(a, b)):
+        result.append(Difference(what, None, None))
+    return result
 
 
 def _time_differences(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[Difference]:
@@ -75,10 +75,10 @@ def _time_differences(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[D
     one, other = a.timeline, b.timeline
     if one is None or other is None or not is_rate_same or len(one.times) != len(other.times):
         return
-    off = np.abs(one.even - other.even)
-    allowed = one.rounding + other.rounding + EXACT
+    off = np.abs(one.regular_times - other.regular_times)
+    allowed = one.rounding + other.rounding + TOLERANCE
     if (off[:1] > allowed).any():
-        first, others = float(one.even[0]), float(other.even[0])
+        first, others = float(one.regular_times[0]), float(other.regular_times[0])
         yield Difference("time of the first frame in s", first, others)
     elif (off > allowed).any():
         yield Difference("times", None, None)
@@ -92,73 +92,73 @@ def _compare(what: str, a: Params, b: Params) -> Difference | None:
     return Difference(what, len(a), len(b), only_a, only_b, changed)
 
 
-def _facts(motion: Motion) -> dict[str, str | int | float | None]:
-    numbers, rate, bones = motion.frame_numbers, motion.frame_rate, motion.skeleton
+def _single_values(motion: Motion) -> dict[str, str | int | float | None]:
+    numbers, rate, skeleton = motion.frame_numbers, motion.frame_rate, motion.skeleton
     return {
         "first frame": 1 if numbers is None or not len(numbers) else int(numbers[0]),
         "frame rate": None if rate is None else float(rate),
-        "unit in cm": bones.unit_cm,
-        "up axis": bones.up_axis or None,
-        "forward axis": bones.forward_axis or None,
-        "handedness": bones.handedness or None,
+        "unit in cm": skeleton.unit_cm,
+        "up axis": skeleton.up_axis or None,
+        "forward axis": skeleton.forward_axis or None,
+        "handedness": skeleton.handedness or None,
     }
 
 
-def _things(motion: Motion) -> dict[str, dict[Any, Any]]:
-    """Things of which a motion may have several, by name or by what they say."""
-    parameters, told = _parameters(motion), recording(motion)
+def _collections(motion: Motion) -> dict[str, dict[Any, Any]]:
+    """Things of which a motion may have several, by name or by text."""
+    parameters, recorded = _parameters(motion), recording(motion)
     arrays = arrays_of(motion.source, [signal.name for signal in motion.signals]) or ()
-    platforms = () if told is None else told.platforms
-    bones = motion.skeleton
-    names = bones.addresses()
+    platforms = () if recorded is None else recorded.platforms
+    skeleton = motion.skeleton
+    names = skeleton.addresses()
     return {
         "joints": {
             name: (names[joint.parent] if joint.parent >= 0 else "", joint.channels)
-            for name, joint in zip(names, bones.joints, strict=True)
+            for name, joint in zip(names, skeleton.joints, strict=True)
         },
         "signals": {
             s.name: (s.n_channels, s.samples_per_frame, s.channels) for s in motion.signals
         },
-        "events": {} if told is None else dict(_events(told.events)),
+        "events": {} if recorded is None else dict(_events(recorded.events)),
         "force platforms": {f"platform {n}": one for n, one in enumerate(platforms, 1)},
         "groups of parameters": {group: None for group, _ in parameters},
         "parameters": parameters,
         "arrays": {str(array["name"]): array["type"] for array in arrays},
-        "metadata": {k: v for k, v in motion.metadata.items() if k not in OF_READERS},
+        "metadata": {k: v for k, v in motion.metadata.items() if k not in READER_METADATA},
     }
 
 
 def _events(events: Iterable[Event]) -> Iterator[tuple[str, Event]]:
-    """Events by words and time; from the second of equal ones on with a suffix ``#n``."""
+    """Events by words and time; the second of equal texts gets #1."""
     seen: Counter[str] = Counter()
     for event in events:
         words = " ".join(filter(None, (event.subject, event.context, event.label)))
         text = f"{words} at {event.time:.6g} s"
+        yield f"{text} #{seen[text]}" if text in seen else text, event
         seen[text] += 1
-        yield text if seen[text] == 1 else f"{text} #{seen[text]}", event
 
 
 def _parameters(motion: Motion) -> dict[tuple[str, str], Any]:
-    """The parameters of a C3D by group and name; of another file none."""
+    """The parameters of a C3D by group and name; none for another file."""
     source = motion.source
     if source is None or FORMATS[source.format].recording is None:
         return {}
-    held = parameters_of(source.format, source.template, source.detail)
+    parameters = parameters_of(source.format, source.template, source.detail)
     return {
-        (group, name): _value(held, parameter)
-        for (group, name), parameter in held.found.items()
-        if name not in OF_DATA
+        (group, name): _value(parameters, parameter)
+        for (group, name), parameter in parameters.found.items()
+        if name not in LAYOUT
     }
 
 
-def _value(held: Parameters, parameter: Parameter) -> Any:
+def _value(parameters: Parameters, parameter: Parameter) -> Any:
     if parameter.type == TEXT:
         return parameter.type, parameter.dims, parameter.data
-    return parameter.type, parameter.dims, held.numbers_of(parameter)
+    return parameter.type, parameter.dims, parameters.numbers_of(parameter)
 
 
 def _source_difference(a: Motion, b: Motion) -> str:
-    """The kind of difference of two sources that is named nowhere else, "" if there is none."""
+    """A name for the difference of two sources whose values are equal, "" if there is none."""
     one, other = a.source, b.source
     if one is None or other is None or one.format != other.format:
         return ""
@@ -171,4 +171,4 @@ def _source_difference(a: Motion, b: Motion) -> str:
     if (one.detail, notes[0]) == (other.detail, notes[1]):
         return ""
     has_arrays = FORMATS[one.format].arrays is not None
-    return "arrays beside the signals" if has_arrays else "texts or layout of the rows"
+    return "arrays other than the signals" if has_arrays else "texts or layout of the rows"

@@ -1,4 +1,4 @@
-"""The faults of a file: of its checksums and index alone, or of all that it holds, decoded."""
+"""The faults of a file: of its checksums and index alone, or of all of it, decoded."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mcz.errors import (
     UnsupportedError,
     remark_of,
 )
-from mcz.files.jobs import limited
+from mcz.files.jobs import limit_jobs
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open, open_bytes
@@ -37,7 +37,7 @@ HEADINGS = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One fault: where, under which heading of SPEC.md, and what.
+    """One fault: its place, the heading of SPEC.md, and a message.
 
     ``clip`` is the clip that the message names.
     """
@@ -51,7 +51,7 @@ class Problem:
 
 
 def heading(source: ByteSource, offset: int) -> str:
-    """The heading of SPEC.md under which the chunk at ``offset`` stands."""
+    """The heading of SPEC.md for the chunk at ``offset``."""
     kind = source.read(offset, min(4, source.size - offset)).decode("latin-1")
     return kind if kind in HEADINGS else "Chunks"
 
@@ -59,11 +59,11 @@ def heading(source: ByteSource, offset: int) -> str:
 def quick_check(
     target: Target, progress: Callable[[int, int], object] | None = None
 ) -> tuple[ChecksumReport, list[Problem]]:
-    """Check every checksum of a file and its index; what was seen, and the faults.
+    """Check every checksum of a file and its index; returns the report and the faults.
 
-    While another process appends to the file, this is of the file up to its last end.
-    ``progress`` is called with the bytes that are done and those of the file.
-    Raises UnsupportedError where it needs a newer reader, AccessError where it cannot be read.
+    While another process appends to the file, this is of the file up to its last end. ``progress``
+    is called with the number of bytes done and the size of the file. Raises UnsupportedError where
+    it needs a newer reader, AccessError where it cannot be read.
     """
     source = open_bytes(target)
     try:
@@ -91,11 +91,11 @@ Row = tuple[str, str, list[Problem]]  # kind, name and faults of a part of a fil
 def validate(file: File, clips: Sequence[Clip] | None = None) -> list[Problem]:
     """Every fault of the file, once: structure, checksums, values, sources, index.
 
-    ``clips``: values and sources of these alone.
+    ``clips``: values and sources of these only.
     """
     problems = structure_problems(file)
-    for _, _, found in part_problems(file, clips):
-        problems += found
+    for _, _, problems_of_part in part_problems(file, clips):
+        problems += problems_of_part
     first: dict[str, Problem] = {}
     for problem in problems:  # a chunk that is damaged hurts all that need it
         first.setdefault(problem.message, problem)
@@ -123,24 +123,23 @@ def verify(
     """Check every checksum of a file, decode everything, restore every source.
 
     Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
-    ``max_decoded`` and ``threads`` are those of ``mcz.open``. ``where``: check every checksum, but
-    decode and restore only the clips that it takes, see ``File.find``; OptionError for none.
-    ``quick``: check the checksums and the index alone, at the speed of the disk; all faults of a
-    file that cannot be opened are told, too.
-    ``jobs`` processes may work at once, by default one.
+    ``max_decoded`` and ``threads`` are as in ``mcz.open``. ``where``: check every checksum, but
+    decode and restore only the clips that match it, see ``File.find``; OptionError for none.
+    ``quick``: check only the checksums and the index, at the speed of the disk; it also reports all
+    faults of a file that cannot be opened. ``jobs`` processes work in parallel, by default one.
     """
     if quick:
         if where is not None:
             raise OptionError("a quick check is of the whole file; it takes no where")
         return quick_check(target)[1]
-    with limited(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
+    with limit_jobs(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
         return validate(file, None if where is None else file.chosen(where=where))
 
 
 def part_problems(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Row]:
     """Kind, name and faults of every skeleton, clip and attachment, one after the other.
 
-    ``clips``: of these alone, and of their skeletons.
+    ``clips``: only these, and their skeletons.
     """
     items = [("skeletons", "")]
     items += [("clip", clip.name) for clip in (file if clips is None else clips)]
@@ -167,11 +166,13 @@ def _problems_of(shared: tuple[File, Sequence[str] | None], item: tuple[str, str
 def _skeleton_rows(file: File, clips: Sequence[Clip] | None) -> list[Row]:
     try:
         ids = None if clips is None else file.skeleton_ids(clips)
-        found = [(id_, skeleton) for id_, skeleton in file.skeletons if ids is None or id_ in ids]
+        skeletons = [
+            (id_, skeleton) for id_, skeleton in file.skeletons if ids is None or id_ in ids
+        ]
     except MczError as error:
         return [("skeletons", "", [Problem(0, "SKEL", remark_of(error))])]
     rows: list[Row] = []
-    for id_, skeleton in found:
+    for id_, skeleton in skeletons:
         offset = file.container.directory.shared[ChunkType.SKEL, id_].offset
         problems = _problems(offset, "SKEL", partial(_restore_skeleton, file, id_))
         rows.append(("skeleton", skeleton.name or id_.hex(), problems))
@@ -190,18 +191,18 @@ def _problems(offset: int, heading: str, work: Callable[[], object]) -> list[Pro
 def clip_problems(file: File, clip: Clip) -> list[Problem]:
     """The faults of one clip: its values and its restored source."""
     row = file.container.directory.clips[clip.name]
-    found = [
+    problems = [
         Problem(row.clip.offset, _clip_heading(error), remark_of(error), error.clip)
         for error in _clip_errors(clip)
     ]
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(problems))
 
 
 def _clip_errors(clip: Clip) -> Iterator[MczError]:
     """The faults of each signal; one that is unsupported does not hide more."""
-    found = _errors_of(lambda: clip.signals)
-    yield from found
-    sound = not found
+    errors = _errors_of(lambda: clip.signals)
+    yield from errors
+    sound = not errors
     for signal in clip.signals if sound else ():
         try:
             clip.check_values(signal.index)
@@ -252,14 +253,15 @@ def _check_recovery(source: ByteSource, chunk: Chunk) -> str:
     sizes = shape.chunk_offset, shape.payload_size
     if sizes != (chunk.offset, chunk.length) or shape.stop > source.size:
         raise FormatError(
-            f"it is about {shape}, not what is around it", where=f"chunk {chunk.label}"
+            f"it protects {shape}, not the bytes around it", where=f"chunk {chunk.label}"
         )
     _, packets = encode_packets(shape, lambda block: shape.block(block, source.read))
     at = chunk.payload_offset
     for packet in packets:
         if source.read(at, len(packet)) != packet:
             raise FormatError(
-                f"the packet at {at} is not that of its bytes", where=f"chunk {chunk.label}"
+                f"the packet at {at} does not match the protected bytes",
+                where=f"chunk {chunk.label}",
             )
         at += len(packet)
     return f"bytes {shape.start} to {shape.stop}"

@@ -11,17 +11,17 @@ from mcz.errors import FormatError
 if TYPE_CHECKING:
     from mcz.files.reading.clip import Clip
 
-RESTORED = "restored"  # the file whose SHA-256 the archive states, byte for byte
-CUT = "cut"  # some of its frames, every number as it was
-LOSSY = "lossy"  # near numbers, printed as those of the source were
+RESTORED = "restored"  # the file whose SHA-256 is stored, byte for byte
+CUT = "cut"  # some of its frames, with all numbers unchanged
+LOSSY = "lossy"  # approximate numbers, printed like the source's
 FILTERED = "filtered"  # numbers of a post filter
-SALVAGED = "salvaged"  # what is whole of it
+SALVAGED = "salvaged"  # its intact parts
 CONVERTED = "converted"  # a file of another format, or numbers
 GIVEN_BACK = (RESTORED, CUT, LOSSY)  # words for all of a clip
 
 
 def fidelity_of(clip: Clip) -> str:
-    """The word for the file that all of ``clip`` gives back; of a sound one it is checked."""
+    """The word for the file that all of ``clip`` restores; the file of a sound clip is checked."""
     record: Mapping[str, str] = {}
     with suppress(FormatError):  # of a damaged file
         record = clip.quality or {}

@@ -1,7 +1,7 @@
 """Fields and metadata of clips by name, as queries use them. See docs/reference/queries.md.
 
-A field costs no more than it must: the first of the table are in the index of the file, the others
-read the CLIP or the skeleton of the clip.
+The first fields of the table are in the index of the file, the others read the CLIP or the skeleton
+of the clip.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Where: TypeAlias = "str | Query | Callable[[Clip], bool]"
 Getter: TypeAlias = "Callable[[Clip], Value]"
-# Short names of fields, among them those that listings have as headings.
+# Short names of fields, among them headings of listings.
 SHORT = {
     "clip": "name",
     "frames": "n_frames",
@@ -36,13 +36,13 @@ SHORT = {
     "unit": "unit_cm",
     "up": "up_axis",
 }
-METADATA = "metadata."  # before a key, where a field has the same name
+METADATA = "metadata."  # before a key that is also the name of a field
 
 
 def filter_clips(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> list[Clip]:
     """Filter ``clips`` by the query ``where``; ``of`` are all clips of their file.
 
-    Raises OptionError for a text that is no query, and for a name in it that no clip knows.
+    Raises OptionError for a malformed query, and for a name that is unknown in all clips.
     """
     from mcz.files.queries import Query
 
@@ -65,10 +65,10 @@ def _matcher(query: Query, clips: Collection[Clip]) -> Callable[[Clip], bool]:
 
 
 def _query_getter(query: Query, name: str, clips: Collection[Clip]) -> Getter:
-    found = _find_getter(name, clips)
-    if found is None:
+    getter = _find_getter(name, clips)
+    if getter is None:
         raise query.unknown(name, _known_names(name, clips))
-    return found
+    return getter
 
 
 def getter_of(name: str, clips: Collection[Clip]) -> Getter:
@@ -76,11 +76,13 @@ def getter_of(name: str, clips: Collection[Clip]) -> Getter:
 
     Raises OptionError for a name that is neither.
     """
-    found = _find_getter(name, clips)
-    if found is None:
-        said = among(sorted(_known_names(name, clips)), name)
-        raise OptionError(f"{name!r} is neither a field nor a metadata key; known are {said}")
-    return found
+    getter = _find_getter(name, clips)
+    if getter is None:
+        known_names = among(sorted(_known_names(name, clips)), name)
+        raise OptionError(
+            f"{name!r} is neither a field nor a metadata key; known are {known_names}"
+        )
+    return getter
 
 
 def _find_getter(name: str, clips: Collection[Clip]) -> Getter | None:
@@ -101,13 +103,12 @@ def _known_names(name: str, clips: Collection[Clip]) -> list[str]:
 
 
 def _metadata(key: str, clip: Clip) -> Value:
-    """Its value; CLIP is not read where a META has the last word."""
+    """Its value; CLIP is not read if a later META decides."""
     last = _last_record(key, clip)
     return clip.metadata.get(key) if last is None else last.entries.get(key)
 
 
 def _last_record(key: str, clip: Clip) -> Record | None:
-    """The record that says last what the key is, or that it is not there any more."""
     records = reversed(clip.container.metadata_records(clip.name))
     return next((r for r in records if key in r.entries or key in r.removed), None)
 
@@ -123,7 +124,6 @@ def _duration(clip: Clip) -> Value:
 
 
 def _lossless(clip: Clip) -> Value:
-    """True if the codecs of all signals are lossless; missing if one is unknown."""
     try:
         return all(
             codec_by_id(s.codec, s.codec_version, s.preset).lossless for s in _row(clip).signals
@@ -143,7 +143,7 @@ def _bytes(clip: Clip) -> Value:
 
 
 def packet_framing(rows: Sequence[SegmentRow]) -> int:
-    """The bytes of open DATA beside the bodies of their packets; ``rows`` in file order."""
+    """The bytes of open DATA outside of the bodies of their packets; ``rows`` in file order."""
     total = n_packets = end = 0
     for row in rows:
         if row.packet:

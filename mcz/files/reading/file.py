@@ -1,6 +1,6 @@
-"""``mcz.open``: an MCZ file and what is in it by name, nothing decoded yet.
+"""``mcz.open``: an MCZ file and its contents by name, decoded on demand.
 
-``clip.py`` turns chunks into values, ``report.py`` tells what a file says of itself.
+``clip.py`` turns chunks into values, ``report.py`` collects the facts of a file.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from mcz.files.reading.source_info import sourced_skeleton
 from mcz.model.motion import Skeleton
 from mcz.model.schema import parse
 from mcz.model.text_format import counted, shown
-from mcz.model.threads import checked
+from mcz.model.threads import check_threads
 from mcz.model.types import JsonObject, Params, Target
 from mcz.sources import FORMATS
 
@@ -53,7 +53,7 @@ def is_mcz(path: str | os.PathLike[str]) -> bool:
 
 
 def is_source(path: str) -> bool:
-    """Return whether a path has the suffix of a source format, and its file is no MCZ file."""
+    """Return whether a path has the suffix of a source format, and its file is not an MCZ file."""
     suffixes = tuple(suffix for known in FORMATS.values() for suffix in known.suffixes)
     return path.lower().endswith(suffixes) and not is_mcz(path)
 
@@ -64,7 +64,7 @@ def suffixes_of(target: str) -> tuple[str, ...]:
 
 
 class StoredSkeleton(NamedTuple):
-    """A skeleton of a file, and its id, by which clips name it."""
+    """A skeleton of a file, and its id, which clips refer to."""
 
     id: bytes
     skeleton: Skeleton
@@ -78,7 +78,7 @@ class AliasTarget(NamedTuple):
 
 
 class Attachment:
-    """A file kept as it is."""
+    """An attached file, byte for byte."""
 
     def __init__(self, container: Container, row: AttachmentRow) -> None:
         self._container, self._row = container, row
@@ -93,12 +93,11 @@ class Attachment:
 
 
 class File:
-    """An open MCZ file: its clips, skeletons and attachments by name, nothing decoded yet.
+    """An open MCZ file: its clips, skeletons and attachments by name, decoded on demand.
 
     It iterates over its clips in file order; ``file[name]`` and ``name in file`` find a clip as
-    ``only_clip`` does.
-    Threads may share it, and processes after a fork. A File and what is taken from it, opened by
-    path, URL or from bytes, can be pickled: what is unpickled opens the same file anew.
+    ``only_clip`` does. Threads may share it, and processes after a fork. A File and its contents,
+    opened by path, URL or from bytes, can be pickled: unpickling opens the same file again.
     """
 
     def __init__(self, container: Container) -> None:
@@ -114,8 +113,10 @@ class File:
         return file_of, (self.container,)
 
     def __repr__(self) -> str:
-        held = f"{counted(len(self.clips), 'clip')}, {counted(len(self.attachments), 'attachment')}"
-        return f"<File {shown(self.name)}: {held}, {self.size} bytes>"
+        counts = (
+            f"{counted(len(self.clips), 'clip')}, {counted(len(self.attachments), 'attachment')}"
+        )
+        return f"<File {shown(self.name)}: {counts}, {self.size} bytes>"
 
     def __iter__(self) -> Iterator[Clip]:
         return iter(self.clips.values())
@@ -124,11 +125,11 @@ class File:
         return len(self.clips)
 
     def __bool__(self) -> bool:
-        """True: a file without clips is a file, too."""
+        """True, also without clips."""
         return True
 
     def __getitem__(self, name: str) -> Clip:
-        """The clip that ``name`` means; raises UnknownNameError, an OptionError and KeyError."""
+        """The clip that ``name`` refers to; raises UnknownNameError."""
         return self.clips[name]
 
     def __contains__(self, thing: object) -> bool:
@@ -163,7 +164,7 @@ class File:
     def alias_of(self, name: str) -> AliasTarget:
         """Resolve an alias to the kind, "clip", "skeleton" or "attachment", and name of its target.
 
-        That is its name, of a skeleton its id in hex, for its own file is what the name restores.
+        A skeleton's name is its id in hex.
         """
         of, target = self.aliases[name]
         if of == payloads.OF_SKELETON:
@@ -183,7 +184,7 @@ class File:
 
     @property
     def unverified(self) -> int:
-        """Segments of which so far only a part was read: nothing vouches for its numbers."""
+        """Number of segments that were read in part, without a check of their checksum."""
         return self.container.unverified
 
     @cached_property
@@ -226,10 +227,10 @@ class File:
         return data
 
     def only_clip(self, name: str | None = None) -> Clip:
-        """The clip called ``name``, or the only one there is.
+        """The clip called ``name``, or the only one.
 
         A clip is found by its name, the path of its source or an alias, and by the last part of one
-        of these where only one clip has it. Raises OptionError, which suggests a name.
+        of these if only one clip has it. Raises OptionError, which suggests a name.
         """
         if name is not None:
             return self.clips[name]
@@ -241,43 +242,43 @@ class File:
         return next(iter(self.clips.values()))
 
     def clips_called(self, names: Iterable[str]) -> list[Clip]:
-        """The clips of these names, each once, in this order; raises as ``only_clip`` does."""
+        """The clips of these names, each once, in this order; raises as ``only_clip``."""
         return list({clip.name: clip for clip in map(self.only_clip, names)}.values())
 
     def find(self, where: Where) -> list[Clip]:
-        """The clips that ``where`` takes, in file order, which may be none.
+        """The clips that match ``where``, in file order, perhaps none.
 
         ``where`` is a function of a Clip or a query, "subject == '05' and n_frames > 500", of
-        docs/reference/queries.md. Raises OptionError for a text that is no query, and for a name in
-        it that is neither a field nor a metadata key of any clip.
+        docs/reference/queries.md. Raises OptionError for a malformed query, and for a name in it
+        that is neither a field nor a metadata key of any clip.
         """
         return filter_clips(self, where, self.clips.values())
 
     def chosen(self, names: Iterable[str] | None = None, where: Where | None = None) -> list[Clip]:
-        """The clips of these names that ``where`` takes; None: all.
+        """The clips of these names that match ``where``; None: all.
 
-        Raises OptionError as ``only_clip`` and ``find`` do, and where ``where`` takes none.
+        Raises OptionError as ``only_clip`` and ``find``, and where no clip matches.
         """
         clips = list(self) if names is None else self.clips_called(names)
         if where is None:
             return clips
-        found = filter_clips(clips, where, self.clips.values())
-        if not found:
-            said = shown(where) if isinstance(where, str) else "what is asked for"
+        matches = filter_clips(clips, where, self.clips.values())
+        if not matches:
+            query = shown(where) if isinstance(where, str) else "what is asked for"
             raise OptionError(
-                f"none of {counted(len(clips), 'clip')} matches {said}", path=self.name
+                f"none of {counted(len(clips), 'clip')} matches {query}", path=self.name
             )
-        return found
+        return matches
 
     def skeleton_ids(self, clips: Iterable[Clip]) -> set[bytes]:
-        """The ids of the skeletons of these clips, and of those that they are derived from."""
-        found: set[bytes] = set()
+        """The ids of the skeletons of these clips, and of the bases of these."""
+        ids: set[bytes] = set()
         for clip in clips:
             id_: bytes | None = clip.skeleton_id
-            while id_ and id_ not in found:
-                found.add(id_)
+            while id_ and id_ not in ids:
+                ids.add(id_)
                 id_ = self.skeleton(id_).base
-        return found
+        return ids
 
 
 def open(
@@ -290,22 +291,22 @@ def open(
 ) -> File:
     """Open an MCZ file lazily: a path, an fsspec target, bytes or a binary stream.
 
-    ``salvage`` reads what a damaged file still holds and lists the rest in ``File.damage``.
+    ``salvage`` reads the intact parts of a damaged file and lists the rest in ``File.damage``.
     ``max_decoded`` replaces the limit of decoded bytes, max(64 MiB, 4096 x file size).
-    ``unverified`` reads no more of a segment than what is asked for (joints, a resolution), so that
-    its checksum cannot be checked and a damaged file may give wrong numbers; ``File.unverified``
-    counts such segments. It saves bytes where segments are large, and does nothing in salvage.
-    ``threads`` may decode at once, by default one a processor; the numbers are the same.
-    ``verify`` compares the SHA-256 of every signal that is decoded whole. By default that of the
-    codecs raw and fast is not compared: checksums guard their bytes.
-    Raises FormatError, in particular TruncatedError where there is no FOOT at the end,
-    AccessError where the file cannot be read, and OptionError.
+    ``unverified`` reads only the requested part of a segment (joints, a resolution), so that its
+    checksum cannot be checked and a damaged file may give wrong numbers; ``File.unverified`` counts
+    such segments. It saves bytes where segments are large, and has no effect in salvage.
+    ``threads`` decode in parallel, by default one a processor; the numbers are the same. ``verify``
+    compares the SHA-256 of every signal that is decoded whole. By default it is not compared for
+    the codecs raw and fast, whose bytes have checksums. Raises FormatError, in particular
+    TruncatedError where there is no FOOT at the end, AccessError where the file cannot be read, and
+    OptionError.
     """
     options = {
         "salvage": salvage,
         "max_decoded": max_decoded,
         "reads_parts": unverified,
-        "threads": checked(threads),
+        "threads": check_threads(threads),
         "verify": verify,
     }
     source = open_bytes(target)
@@ -321,7 +322,7 @@ def open(
 
 
 def open_bytes(target: Target) -> ByteSource:
-    """The bytes of ``target``, as ``open`` takes it; raises AccessError and OptionError."""
+    """The bytes of ``target``, as for ``open``; raises AccessError and OptionError."""
     try:
         return open_source(target)
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
@@ -347,7 +348,7 @@ def _open_source(source: ByteSource, options: Params) -> File:
                     raise
                 end = error.last_foot
                 break
-            if size == source.size:  # nobody is at it, or has been meanwhile
+            if size == source.size:  # no process is appending, or was meanwhile
                 raise
             source = source.up_to(size)
     file = file_of(Container(source.up_to(end), **options))

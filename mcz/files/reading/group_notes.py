@@ -1,4 +1,4 @@
-"""Group notes: grids that change, and numbers that lie on none; put together over segments.
+"""Group notes: grid changes, and numbers off their grid; joined over segments.
 
 SPEC.md, "Group notes", is normative.
 """
@@ -25,17 +25,17 @@ class Noted:
 
     def __init__(self, baseline: Sequence[Grid], n_rows: int) -> None:
         self._baseline, self._n_rows = baseline, n_rows
-        self._grids: dict[int, dict[int, Grid]] = {}  # from a row on, where not those of CLIP
+        self._grids: dict[int, dict[int, Grid]] = {}  # by row, grids that differ from CLIP
         self._exceptions: list[tuple[int, int, bytes]] = []
         self._row = 0
 
     def begin(self, row: int) -> None:
-        """A segment begins at ``row``, which may lie before the first that counts."""
+        """Begin a segment at ``row``, which may be before the first row of the range."""
         self._row = max(0, row)
         self._grids.setdefault(self._row, {})
 
     def add(self, shift: int, columns: Sequence[int], notes: ParsedNotes) -> None:
-        """The notes of a group, whose first row is ``shift`` and whose channels are ``columns``."""
+        """Add the notes of a group with the first row ``shift`` and the channels ``columns``."""
         for channel, grid in notes[0]:
             self._grids[self._row][columns[channel]] = grid
         self._exceptions += [
@@ -45,25 +45,25 @@ class Noted:
         ]
 
     def exceptions(self) -> Exceptions:
-        found = sorted(self._exceptions)
+        entries = sorted(self._exceptions)
         return Exceptions(
-            np.array([row for row, _, _ in found], np.int64),
-            np.array([column for _, column, _ in found], np.int64),
-            tuple(text for _, _, text in found),
+            np.array([row for row, _, _ in entries], np.int64),
+            np.array([column for _, column, _ in entries], np.int64),
+            tuple(text for _, _, text in entries),
         )
 
     def grid_changes(self) -> tuple[tuple[int, int, Grid], ...]:
-        """Grids stated segment by segment as changes from the row before."""
+        """Convert grids stated segment by segment to changes from the row before."""
         changes: list[tuple[int, int, Grid]] = []
         if not any(self._grids.values()):
             return ()
         current = list(self._baseline)
         for row in sorted(self._grids):
             for column, grid in enumerate(self._baseline):
-                wanted = self._grids[row].get(column, grid)  # NOTES-06
-                if wanted != current[column]:
-                    changes.append((row, column, wanted))
-                    current[column] = wanted
+                new_grid = self._grids[row].get(column, grid)  # NOTES-06
+                if new_grid != current[column]:
+                    changes.append((row, column, new_grid))
+                    current[column] = new_grid
         return tuple(changes)
 
 
@@ -97,7 +97,7 @@ def parse_group_notes(data: bytes, n_rows: int, grids: Sequence[Grid], name: str
 
 
 def values_of_exceptions(texts: Sequence[bytes], name: str) -> NDArray[np.float64]:
-    """The numbers that exceptions spell; raises FormatError where one is none."""
+    """The numbers that exceptions spell; raises FormatError for a bad one."""
     values, bad = values_of_texts(texts)  # TEXT-05
     if bad.any():
         text = texts[int(np.argmax(bad))]

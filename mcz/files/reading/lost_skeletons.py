@@ -1,6 +1,6 @@
-"""Skeletons that a damaged file has lost, made again from the source files that they came of.
+"""Rebuild the lost skeletons of a damaged file from stored source files.
 
-The id of a skeleton is a hash of its bytes: what has the id is what was lost.
+The id of a skeleton is a hash of its bytes, which proves the result.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ from mcz.sources import FORMATS, format_by_id
 
 ASF = FORMATS["asf"]
 LOST = "its skeleton is lost; its channels have no names"
-NAMELESS = "skeleton"  # what a skeleton is called where neither its file nor a path says it
+NAMELESS = "skeleton"  # the name of a skeleton without one in its file or path
 
 
 def restore_skeletons(container: Container) -> None:
-    """Give a salvaged file the skeletons that clips name, that it lost, and whose ASF it has."""
+    """Restore lost skeletons of clips in a salvaged file from their ASF in it."""
     lost = _lost_ids(container)
     if not lost:
         return
     for (kind, id_), chunk in list(container.directory.shared.items()):
         if kind == ChunkType.SRCE:
-            with suppress(MczError):  # of another format, damaged as well, or no ASF
+            with suppress(MczError):  # another format, damaged too, or not an ASF
                 made = _asf_skels(container, id_, lost)
                 _restore(container, lost, made, f"its ASF, {chunk.label}")
     for kind, id_ in list(container.directory.shared):
@@ -66,9 +66,9 @@ def restore_skeletons(container: Container) -> None:
 
 
 def _without_joints(container: Container, row: ClipRow) -> None:
-    """Let a clip whose skeleton is lost for good have plain channels, if its hashes then are right.
+    """Give a clip of a lost skeleton plain channels, if its hashes are right with them.
 
-    Codecs of channels need no more of a skeleton than which of them belong together.
+    Codecs of channels need only the groups of a skeleton's channels.
     """
     fields = container.clip(row)
     motion = _zero_motion(container, fields, row, None)
@@ -95,7 +95,7 @@ def _joint_sizes(n_channels: int, kind: int) -> Iterator[list[int]]:
 
 
 def _has_its_hashes(clip: Clip, container: Container) -> bool:
-    """Return whether the values of a clip, read strictly, are those that it says it has."""
+    """Return whether the values of a clip, read strictly, have the stated hashes."""
     try:
         for info in clip.signals:
             stops = [0, *(row.header.stop for row in info.rows)]
@@ -143,16 +143,17 @@ def _asf_skels(container: Container, template: bytes, lost: set[bytes]) -> Itera
 
 
 def _unit_skels(skeleton: Skeleton, source: payloads.SkeletonSource | None) -> Iterator[bytes]:
-    """The payloads of SKEL of a skeleton, under each length unit that it may have been given."""
+    """The payloads of SKEL of a skeleton, under each length unit that it may have."""
     for unit_cm in dict.fromkeys((skeleton.unit_cm, None, *UNIT_CM.values())):
         payload = build_skeleton(replace(skeleton, unit_cm=unit_cm), source)
         yield from (payload, pack_skeleton(payload))
 
 
 def _clip_skels(container: Container, row: ClipRow) -> Iterator[bytes]:
-    """The payloads of SKEL that writers make of a clip's own file: the header says them all.
+    """The payloads of SKEL that writers make of a clip's own file, from its header.
 
-    What position channels do to the offset the frames decide, which may be lost: all ways.
+    The frames, which may be lost, decide whether position channels replace the offset: both are
+    tried.
     """
     fields = container.clip(row)
     for source in [fields.source] if fields.source else []:
@@ -172,9 +173,9 @@ def _clip_skels(container: Container, row: ClipRow) -> Iterator[bytes]:
 def _zero_motion(
     container: Container, fields: payloads.Clip, row: ClipRow, source: Source | None
 ) -> Motion:
-    """A motion like that of a clip, all of whose values are zero, on a joint of plain channels.
+    """A motion like that of a clip, with all values zero, on a joint of plain channels.
 
-    Raises LimitError for one that no file so long may have.
+    Raises LimitError for one too large for the file.
     """
     signals = []
     for index, own in enumerate(fields.signals):
@@ -218,7 +219,7 @@ def _offset_ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:
 
 
 def _base_skels(container: Container, base: bytes) -> Iterator[bytes]:
-    """The payloads of SKEL that writers derive from a skeleton where another axis points up."""
+    """The payloads of SKEL that writers derive from a skeleton for another up axis."""
     skeleton = container.skeleton(base)
     for up_axis in AXES:
         payload = build_skeleton(replace(skeleton, up_axis=up_axis, base=base), None)

@@ -1,7 +1,7 @@
-"""The post filter of clips of positions: what a reader may do about the jitter of a coarse codec.
+"""The post filter of clips of positions, against the jitter of a coarse codec.
 
-The filter is a reader's choice: nothing of it is stored, and hashes are those of the values without
-it. SPEC.md, "Post filter", is normative.
+The filter is a reader's choice: the file stores nothing of it, and hashes are of the unfiltered
+values. SPEC.md, "Post filter", is normative.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.transforms.post_filter import PostFilter, filter_rows
 from mcz.errors import MotionError, OptionError
@@ -24,29 +23,26 @@ from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import SEPARATOR
 from mcz.model.motion import Motion, Signal, Skeleton
-from mcz.model.types import Values
+from mcz.model.types import Bools, Floats, Values
 from mcz.sources import FORMATS
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-NOTE = "post-filtered"  # ends the source-note of what was filtered
+NOTE = "post-filtered"  # the source-note of a filtered motion ends with it
 
 
 def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
-    """``motion``, one of markers, the noise of coarse quantization filtered out of its positions.
+    """Filter quantization noise out of the positions of a motion of markers.
 
-    Each coordinate goes through a low-pass of 1, 3 or 5 Hz over 25 rows, chosen by how well its
-    past predicts it. That helps where positions are off by more than a centimeter or two, and harms
+    Each coordinate passes a low-pass of 1, 3 or 5 Hz over 25 rows, chosen by how well its past
+    predicts it. That helps where positions are off by more than a centimeter or two, and harms
     where they are nearly exact. Unknown positions stay unknown. The other signals are kept; there
-    is no source. ``rate`` is the frame rate, in place of the motion's own.
+    is no source. ``rate`` replaces the frame rate of the motion.
 
-    Raises MotionError where there are other joints than markers, OptionError where the length unit
+    Raises MotionError for a motion that is not of markers alone, OptionError where the length unit
     or the frame rate is unknown.
     """
     motion = SourceOptions(rate=rate).applied_to(motion)
     first = motion.signals[0]
-    _check_markers(motion.name, motion.skeleton, first.channels)
+    _check_markers(motion.name, motion.skeleton, first.channels is not None)
     settings = _settings(motion.name, motion.skeleton, motion.frame_rate, first.samples_per_frame)
     signal = Signal(
         _filter(first.values, first.mask, *settings),
@@ -55,17 +51,17 @@ def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
         mask=first.mask,
     )
     filtered = replace(
-        motion, signals=(signal, *motion.signals[1:]), metadata=_noted(motion.metadata)
+        motion, signals=(signal, *motion.signals[1:]), metadata=_with_note(motion.metadata)
     )
     return filtered.without_source()
 
 
 def live_filter(skeleton: Skeleton, rate: Fraction | None, name: str = "live") -> PostFilter:
-    """The filter of the frames of a clip ``name`` that come one by one; raises as ``post_filter``.
+    """A filter for the frames of a live clip ``name``; raises as ``post_filter``.
 
-    Its rows are NaN where a position is not known.
+    Its rows are NaN where a position is unknown.
     """
-    _check_markers(name, skeleton, None)
+    _check_markers(name, skeleton, False)
     return PostFilter(skeleton.n_channels, *_settings(name, skeleton, rate, 1))
 
 
@@ -76,12 +72,12 @@ def filtered_part(
     resolution: int = 0,
     *,
     rate: Fraction | None = None,
-) -> tuple[Values, Mask | None]:
-    """As ``clip.read_masked`` of the motion signal, cut out of the whole clip, filtered."""
+) -> tuple[Values, Bools | None]:
+    """The whole clip is filtered, then the part cut out; shapes as of ``clip.read_masked``."""
     info, skeleton = clip.signals[0], clip.skeleton
     start, stop = clip.checked_range(frames)
     per_frame = info.layout.samples_per_frame
-    _check_markers(clip.name, skeleton, info.channels)
+    _check_markers(clip.name, skeleton, info.channels is not None)
     settings = _settings(clip.name, skeleton, rate or clip.frame_rate, per_frame)
     values, mask = clip.read_masked(None, None, resolution)  # FILT-04
     rows = slice(start * per_frame, stop * per_frame)  # FILT-04
@@ -100,13 +96,15 @@ def filtered_motion(
     decimate: bool = False,
     rate: Fraction | None = None,
 ) -> Motion:
-    """As ``clip.motion``, its positions cut out of the whole clip, filtered; without a source."""
-    motion = _with_places(clip, frames, resolution, decimate, rate).without_source()
+    """As ``clip.motion``, without a source: the whole clip is filtered, then the part cut out."""
+    motion = _filtered_on_grids(clip, frames, resolution, decimate, rate).without_source()
     first = motion.signals[0]
     signal = Signal(
         first.values, name=first.name, samples_per_frame=first.samples_per_frame, mask=first.mask
     )
-    return replace(motion, signals=(signal, *motion.signals[1:]), metadata=_noted(motion.metadata))
+    return replace(
+        motion, signals=(signal, *motion.signals[1:]), metadata=_with_note(motion.metadata)
+    )
 
 
 def filtered_source(
@@ -117,22 +115,22 @@ def filtered_source(
     decimate: bool = False,
     rate: Fraction | None = None,
 ) -> bytes:
-    """As ``clip.source_bytes``, of filtered positions: the source's own style, other numbers."""
-    motion = _with_places(clip, frames, resolution, decimate, rate)
+    """As ``clip.source_bytes``, with filtered positions in the style of the source."""
+    motion = _filtered_on_grids(clip, frames, resolution, decimate, rate)
     if clip.source is None or motion.source is None:
         raise OptionError("no source file", clip=clip.name, hint=Hint.CONVERT)
     data: bytes = FORMATS[clip.source.format].write(stating_rate(motion, clip.frame_numbers))
     return data
 
 
-def _with_places(
+def _filtered_on_grids(
     clip: Clip,
     frames: tuple[int, int] | None,
     resolution: int,
     decimate: bool,
     rate: Fraction | None,
 ) -> Motion:
-    """``clip.motion`` with filtered values, on the grids of the clip where they can be."""
+    """``clip.motion`` with filtered values, on the grids of the clip where possible."""
     values, mask = filtered_part(clip, frames, None, resolution, rate=rate)
     motion = clip.motion(frames, resolution, decimate=decimate)
     first, step = motion.signals[0], 2**resolution if decimate else 1
@@ -153,9 +151,9 @@ def _with_places(
     return replace(motion, signals=(signal, *motion.signals[1:]))
 
 
-def _check_markers(name: str, skeleton: Skeleton, own: object) -> None:
-    """Raise MotionError for a motion that has other joints than markers, or channels of its own."""
-    if own is not None or point_set(skeleton) != "markers":
+def _check_markers(name: str, skeleton: Skeleton, has_channels: bool) -> None:
+    """Raise MotionError for a motion of other joints than markers, or with channels of its own."""
+    if has_channels or point_set(skeleton) != "markers":
         raise MotionError(
             f"motion {name!r} is not one of markers alone, and the post filter is for positions; "
             "mcz.in_positions makes them of a skeleton's motion"
@@ -181,7 +179,7 @@ def _settings(
     return rate.numerator / rate.denominator * per_frame, skeleton.unit_cm  # FILT-07
 
 
-def _filter(values: Values, mask: Mask | None, rate: float, unit_cm: float) -> Floats:
+def _filter(values: Values, mask: Bools | None, rate: float, unit_cm: float) -> Floats:
     rows = np.asarray(values, np.float64)
     if mask is None:
         return filter_rows(rows, rate, unit_cm)
@@ -189,6 +187,6 @@ def _filter(values: Values, mask: Mask | None, rate: float, unit_cm: float) -> F
     return np.where(mask, filter_rows(np.where(mask, rows, np.nan), rate, unit_cm), rows)
 
 
-def _noted(metadata: Mapping[str, str]) -> dict[str, str]:
+def _with_note(metadata: Mapping[str, str]) -> dict[str, str]:
     notes = [note for note in (metadata.get("source-note"), NOTE) if note]
     return dict(metadata) | {"source-note": SEPARATOR.join(notes)}

@@ -1,4 +1,4 @@
-"""Notes where the text of a source states other times than its clip has."""
+"""Notes for a source text that states other times than its clip."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ UNTIMED = (
 
 
 def _rate_note(clip: Clip, is_file: bool) -> str | None:
-    """A note where what ``source_bytes`` gives states another rate than ``clip`` has.
+    """A note if the result of ``source_bytes`` states another rate than ``clip``.
 
-    ``is_file``: it gives the very file. Raises FormatError on bad bytes.
+    ``is_file``: it is the original file. Raises FormatError on bad bytes.
     """
     rate = clip.frame_rate
     if rate is None or clip.source is None:
@@ -36,9 +36,9 @@ def _rate_note(clip: Clip, is_file: bool) -> str | None:
 
 
 def _start_note(clip: Clip, start: int, is_file: bool) -> str | None:
-    """A note where a part from frame ``start`` on is printed without the time of that frame.
+    """A note if a part from frame ``start`` on is printed without the time of that frame.
 
-    ``is_file``: the text is the very file, which never said it.
+    ``is_file``: the text is the original file, which never stated it.
     """
     source = clip.source
     if source is None or source.format not in UNTIMED or start >= clip.n_frames:
@@ -59,25 +59,25 @@ def text_notes(clip: Clip, start: int = 0, *, is_file: bool | None = None) -> tu
 
 
 def states_rate(clip: Clip) -> bool:
-    """Tell whether the source of ``clip`` states a frame rate; raises FormatError on bad bytes."""
+    """Return whether the source of ``clip`` states a frame rate; raises FormatError."""
     rate, source = clip.frame_rate, clip.source
     if rate is None or source is None or not FORMATS[source.format].states_rate:
         return False
-    found, _ = _read_contradiction(clip, rate)
-    return found is None or bool(found.rate)
+    stated_rate, _ = _read_contradiction(clip, rate)
+    return stated_rate is None or bool(stated_rate.rate)
 
 
 def _stated_rate(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
-    """The rate that the text states, None where it is that of the clip or none."""
+    """The rate that the text states, None if it is the clip's or absent."""
     try:
-        found, template = _read_contradiction(clip, rate)
+        stated_rate, template = _read_contradiction(clip, rate)
     except FormatError:
         if not clip.container.salvage:
             raise
-        return None  # it is lost, as is told
-    if found is not None:
-        stated: Fraction = found.rate
-        return stated if is_file or found.template == template else None
+        return None  # its loss is already reported
+    if stated_rate is not None:
+        stated: Fraction = stated_rate.rate
+        return stated if is_file or stated_rate.template == template else None
     column = clip.times_column()
     if column is None:
         return None

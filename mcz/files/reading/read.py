@@ -1,8 +1,8 @@
-"""``mcz.read``: the motion in a file of any format, and the skeleton for it: never one only near.
+"""``mcz.read``: the motion in a file of any format, and its certain skeleton.
 
-An ASF is taken without a word where its name fits the take and all bones fit the file. One that
-somebody named, or the only one around whose bones fit, is taken with a remark. All else is a
-riddle, and an error that lists what is there.
+An ASF is used silently if its name fits the take and all bones fit the file. One that the caller
+named, or the only one nearby whose bones fit, is used with a remark. Any other case is an error
+that lists the candidates.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from mcz.model.units import in_unit
 from mcz.sources import Format, format_of
 from mcz.sources.text.bones import Candidate, Match, match_bones, skeletons_around
 
-NONE = "none"  # given in place of a skeleton file: do without
+NONE = "none"  # given in place of a skeleton file: use none
 NOTE = "skeleton-note"
 SHOWN = 8  # names in a message
 Given = str | os.PathLike[str] | Skeleton | None
@@ -47,13 +47,13 @@ def read(
 ) -> Motion:
     """The motion in a file of any source format, or in an MCZ file.
 
-    An AMC finds its ASF beside it, or takes ``skeleton``, a path, a Skeleton or "none"; how it was
-    found stands in the metadata, and a SkeletonWarning tells of one whose name or dofs do not fit.
+    An AMC finds its ASF next to it, or takes ``skeleton``, a path, a Skeleton or "none"; the
+    metadata state how it was found, and a SkeletonWarning reports a name or dofs that do not fit.
     ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
-    ("x" to "-z"), say what the file does not. ``arrays`` says what the numbers of a plain NPY or
-    NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". ``model``
-    is a model file of SMPL and its kin, which says how long the bones of such a body in an NPZ are
-    ("{gender}" and "{body}" in it: those of the take). Of an MCZ file ``clip`` is read, with
+    ("x" to "-z"), state facts that the file lacks. ``arrays`` is the meaning of the numbers of a
+    plain NPY or NPZ: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw".
+    ``model`` is a model file of SMPL or a related one, with the lengths of bones of such a body in
+    an NPZ ("{gender}" and "{body}" in it: those of the take). Of an MCZ file ``clip`` is read, with
     ``max_decoded``, ``threads`` and ``verify`` as in ``open``. Raises SourceError, FormatError or
     OptionError.
     """
@@ -69,15 +69,15 @@ def read(
         if taken.remark:
             warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
         motion = taken.motion
-    said = SourceOptions(rate=rate, unit=unit, up=up, arrays=arrays, model=model)
-    return said.applied_to(motion)
+    options = SourceOptions(rate=rate, unit=unit, up=up, arrays=arrays, model=model)
+    return options.applied_to(motion)
 
 
 @dataclass(frozen=True, slots=True)
 class SkeletonChoice:
-    """A skeleton for a motion file: ``how`` it was found, and what is to be said of it, or "".
+    """A skeleton for a motion file: ``how`` it was found, and a remark, or "".
 
-    ``path`` is that of its file, where it has one that was read here.
+    ``path`` is its file's, if it was read from one here.
     """
 
     skeleton: Skeleton
@@ -99,7 +99,7 @@ class ReadMotion:
 
     @property
     def remark(self) -> str:
-        """The remark about the skeleton, "" where there is none."""
+        """The remark about the skeleton, "" if there is none."""
         return self.chosen.remark if self.chosen is not None else ""
 
 
@@ -111,12 +111,12 @@ def read_motion(
     *,
     flat: bool = False,
 ) -> ReadMotion:
-    """Read the motion file ``path``, whose bytes are ``data`` if they were read already.
+    """Read the motion file ``path``, whose bytes are ``data`` if already read.
 
-    ``given`` is the skeleton of a format that wants one: an object, the path of a file, "none" for
-    none, or None to look around. The metadata say how it was found. Raises SourceError where no
-    skeleton can be taken, and as ``read_source`` does; with ``flat`` a file for which several of
-    those around may be meant is read without one, and the metadata say so.
+    ``given`` is the skeleton of a format that needs one: an object, the path of a file, "none" for
+    none, or None to search. The metadata state how it was found. Raises SourceError where no
+    skeleton can be chosen, and as ``read_source``; with ``flat`` a file with several possible
+    skeletons nearby is read without one, and the metadata mention it.
     """
     source_format, data = load(path) if data is None else (format_of(path, data), data)
     if not source_format.wants_skeleton:
@@ -139,7 +139,7 @@ def read_motion(
 
 
 def with_note(motion: Motion, how: str) -> Motion:
-    """``motion`` whose metadata say how its skeleton was found."""
+    """``motion`` with metadata on how its skeleton was found."""
     notes = "; ".join(filter(None, (how, motion.metadata.get(NOTE, ""))))
     return replace(motion, metadata=dict(motion.metadata) | {NOTE: notes})
 
@@ -147,7 +147,7 @@ def with_note(motion: Motion, how: str) -> Motion:
 def choose_skeleton(
     path: Path, source_format: Format, data: bytes, given: Given
 ) -> SkeletonChoice | None:
-    """The skeleton for the file ``path`` with the bytes ``data``, None where there is none."""
+    """The skeleton for the file ``path`` with the bytes ``data``, None if there is none."""
     assert source_format.bones is not None
     counts = source_format.bones(data)
     if isinstance(given, Skeleton):
@@ -155,8 +155,8 @@ def choose_skeleton(
     if given is not None:
         if given == NONE:
             return None
-        found = _check_asked(path, read_skeleton(given), str(given), counts)
-        return replace(found, path=Path(given))
+        choice = _check_asked(path, read_skeleton(given), str(given), counts)
+        return replace(choice, path=Path(given))
     return _choose_candidate(path, skeletons_around(path), counts) if counts else None
 
 
@@ -183,8 +183,8 @@ def check_own(path: str, skeleton: Skeleton, label: str, counts: Counts) -> None
 
 
 @dataclass(frozen=True, slots=True)
-class _Tried:
-    """A candidate and how its bones match; ``skeleton`` None where it cannot be read."""
+class _Candidate:
+    """A candidate and how its bones match; ``skeleton`` None if it cannot be read."""
 
     candidate: Candidate
     skeleton: Skeleton | None
@@ -197,7 +197,7 @@ class _Tried:
         return 0 if self.match.lacking or self.skeleton is None else 2 - bool(self.match.differing)
 
     def describe(self, folder: Path) -> str:
-        """The file, as seen from ``folder``, and how its bones match."""
+        """The file, relative to ``folder``, and how its bones match."""
         path = _seen_from(folder, self.candidate.path)
         if self.fault:
             return f"{path} (which cannot be read)"
@@ -211,7 +211,6 @@ class _Tried:
 def _choose_candidate(
     path: Path, around: Sequence[Candidate], counts: Counts
 ) -> SkeletonChoice | None:
-    """The one of the candidates that can be taken; None where there are none."""
     named = [_try(candidate, counts) for candidate in around if candidate.name_of]
     for grade in (2, 1):
         fitting = [one for one in named if one.grade == grade]
@@ -230,17 +229,17 @@ def _choose_candidate(
     return None
 
 
-def _try(candidate: Candidate, counts: Counts) -> _Tried:
+def _try(candidate: Candidate, counts: Counts) -> _Candidate:
     try:
         skeleton = read_skeleton(candidate.path)
     except SourceError as error:
         if candidate.name_of:
             raise
-        return _Tried(candidate, None, Match((), (), 0), str(error))
-    return _Tried(candidate, skeleton, match_bones(skeleton, counts))
+        return _Candidate(candidate, None, Match((), (), 0), str(error))
+    return _Candidate(candidate, skeleton, match_bones(skeleton, counts))
 
 
-def _only(path: Path, fitting: list[_Tried], all_: list[_Tried]) -> SkeletonChoice:
+def _only(path: Path, fitting: list[_Candidate], all_: list[_Candidate]) -> SkeletonChoice:
     first = fitting[0]
     if len(fitting) > 1:
         if first.candidate.name_of:
@@ -266,8 +265,8 @@ def _with_misfits(
     match = match_bones(chosen.skeleton, source_format.bones(data, whole=True))
     label = _printable(str(chosen.path or chosen.skeleton.name or "the skeleton"))
     if match.lacking and not asked:
-        found = label if chosen.path is None else _printable(_seen_from(path.parent, chosen.path))
-        raise SourceError(f"{found} lacks {_listed(match.lacking)}", path=path, hint=Hint.SKELETON)
+        name = label if chosen.path is None else _printable(_seen_from(path.parent, chosen.path))
+        raise SourceError(f"{name} lacks {_listed(match.lacking)}", path=path, hint=Hint.SKELETON)
     remark = chosen.remark
     if match.lacking:
         remark = f"{label} lacks {_listed(match.lacking)}; they are scalars without kinematics"
@@ -278,19 +277,19 @@ def _with_misfits(
 
 
 class AmbiguousError(SourceError):
-    """Several skeletons may be meant; ``reason`` says which, without their folders."""
+    """Several skeletons are possible; ``reason`` names them, without their folders."""
 
     reason = ""
 
 
-def _ambiguous_error(path: Path, tried: Sequence[_Tried], text: str) -> AmbiguousError:
+def _ambiguous_error(path: Path, tried: Sequence[_Candidate], text: str) -> AmbiguousError:
     riddle = _riddle_error(path, tried, text)
     error = AmbiguousError(riddle.message, **riddle.fields)
     error.reason = f"{text}: {_listed([_printable(one.candidate.path.name) for one in tried])}"
     return error
 
 
-def _riddle_error(path: Path, tried: Sequence[_Tried], text: str) -> SourceError:
+def _riddle_error(path: Path, tried: Sequence[_Candidate], text: str) -> SourceError:
     shown = first_of([_printable(one.describe(path.parent)) for one in tried], SHOWN)
     return SourceError(f"{text}: {shown}", path=path, hint=Hint.SKELETON)
 
@@ -308,5 +307,5 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _printable(name: str) -> str:
-    """A name of a file as text that any file can hold."""
+    """A name of a file as text that any file can store."""
     return name.encode("utf-8", "backslashreplace").decode()

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 def info(file: File, names: Sequence[str] | None = None, where: Where | None = None) -> JsonObject:
     """The document that ``mcz info --json`` prints; its keys are stable.
 
-    ``names``, ``where``: of these clips alone, and of their skeletons, see ``File.chosen``.
+    ``names``, ``where``: only of these clips, and of their skeletons, see ``File.chosen``.
     """
     container, whole = file.container, names is None and where is None
     chosen = file.chosen(names, where)
@@ -175,7 +175,7 @@ def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
 
 
 def _exact_joints(clip: Clip, signal: SignalInfo) -> list[str]:
-    """The joints that have exact channels beside lossy ones, where they are known."""
+    """The joints that have exact channels besides lossy ones, if known."""
     try:
         columns = {c for group in signal.exact for c in signal.layout.groups[group]}
     except FormatError:
@@ -186,8 +186,8 @@ def _exact_joints(clip: Clip, signal: SignalInfo) -> list[str]:
 
 
 def _facts_beside_values(clip: Clip) -> tuple[JsonObject, list[str]]:
-    """Facts in source and signals, each None where its bytes are at fault; and these faults."""
-    found: JsonObject = {"times": None, "recording": None, "arrays": None}
+    """Facts in source and signals, each None if its bytes are damaged; and these faults."""
+    facts: JsonObject = {"times": None, "recording": None, "arrays": None}
     unread = []
     for key, read in (
         ("times", _times),
@@ -195,10 +195,10 @@ def _facts_beside_values(clip: Clip) -> tuple[JsonObject, list[str]]:
         ("arrays", _arrays),
     ):
         try:
-            found[key] = read(clip)
+            facts[key] = read(clip)
         except FormatError as error:
             unread.append(f"{key}: {error}")
-    return found, unread
+    return facts, unread
 
 
 def _times(clip: Clip) -> JsonObject | None:
@@ -212,7 +212,6 @@ def _recording(clip: Clip) -> JsonObject | None:
 
 
 def _arrays(clip: Clip) -> list[JsonObject] | None:
-    """The fate of the arrays of the source, None where it has none."""
     if clip.source is None or FORMATS[clip.source.format].arrays is None:
         return None
     return arrays_of(clip.motion((0, 0)).source, [signal.name for signal in clip.signals])
@@ -229,14 +228,14 @@ def exceptions_info(container: Container, clip: Clip) -> JsonObject:
             if not row.header.flags & GROUP_NOTES:
                 continue
             table = container.table(row, signal.counts)
-            wanted = [
+            signals = [
                 i
                 for g in range(signal.counts.n_groups)
                 if (i := table.group_notes(g)) is not None and table.lengths[i]
             ]
-            if wanted:
-                _, streams = container.streams(row, signal.counts, wanted)
-                notes = (parse(GroupNotes, streams[i], "group notes") for i in wanted)
+            if signals:
+                _, streams = container.streams(row, signal.counts, signals)
+                notes = (parse(GroupNotes, streams[i], "group notes") for i in signals)
                 n_exceptions += sum(len(one.exceptions) for one in notes)
     share = n_exceptions / n_tokens if n_tokens else 0.0
     return {"n_exceptions": n_exceptions, "exceptions_share": share}
@@ -247,8 +246,8 @@ def source_info(
 ) -> JsonObject:
     """The document that ``mcz info --json`` prints of a source file.
 
-    Its keys are those of ``report.info`` that have a meaning without MCZ; ``format`` is that of the
-    file. ``skeleton`` is the ASF of an AMC. Raises SourceError or OptionError.
+    Its keys are those of ``report.info`` that apply without MCZ; ``format`` is the file's.
+    ``skeleton`` is the ASF of an AMC. Raises SourceError or OptionError.
     """
     path = Path(path)
     source_format, data = load(path)
@@ -259,7 +258,7 @@ def source_info(
     if taken.remark:
         warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
     motion = taken.motion
-    if motion.source is not None and source_format.is_table:  # of .csv there are several
+    if motion.source is not None and source_format.is_table:  # there are several formats of .csv
         source_format = FORMATS[motion.source.format]
         document["format"] = source_format.name
     clip = _clip_facts(motion, source_format, path.name, data)
@@ -306,11 +305,11 @@ def _clip_facts(motion: Motion, source_format: Format, name: str, data: bytes) -
 
 
 def document_of(recording: Recording | None) -> JsonObject | None:
-    """The recording as JSON has it: what is unknown or no number is None; texts may be empty."""
+    """The recording as JSON: unknown values and NaN become None; texts may be empty."""
     if recording is None:
         return None
-    found: JsonObject = _plain(asdict(recording))
-    return found | {"up_axis": recording.up_axis}
+    document: JsonObject = _plain(asdict(recording))
+    return document | {"up_axis": recording.up_axis}
 
 
 def _plain(thing: object) -> Any:

@@ -1,7 +1,4 @@
-"""Decoding what a damaged signal still holds.
-
-SPEC.md, "Salvage", is normative.
-"""
+"""Decode the intact segments of a damaged signal. SPEC.md, "Salvage", is normative."""
 
 from __future__ import annotations
 
@@ -17,19 +14,19 @@ Complain = Callable[[int, int, object], None]
 
 def salvage(
     spans: Sequence[Span],
-    wanted: range,
+    segments: range,
     frames: tuple[int, int],
     rescue: Callable[[int, int], None],
     complain: Complain,
 ) -> None:
-    """Let ``rescue`` decode all frames a <= f < b of the segments ``wanted`` that can be decoded.
+    """Let ``rescue`` decode all frames a <= f < b of ``segments`` that can be decoded.
 
-    It raises FormatError for what cannot be; that is halved until it is known what it is that
-    cannot. ``complain`` is told what is lost, and why. The cost is that of decoding once, and a few
-    times more for each segment that is bad.
+    ``rescue`` raises FormatError for a range that cannot be; it is halved until the bad segments
+    are known. ``complain`` gets lost frames and the reason. The cost is one decoding, and a few
+    more for each bad segment.
     """
     lead = max((span.lead for span in spans), default=0)
-    for run in _runs(spans, wanted, complain):
+    for run in _runs(spans, segments, complain):
         todo = [run]
         while todo:
             first, last = todo.pop()
@@ -43,10 +40,10 @@ def salvage(
                     middle = (first + last) // 2
                     todo += [(middle, last), (first, middle)]
                     continue
-                # Frames that the segment after bears upon may be lost with it; others are not.
+                # Frames that the segment after affects may be lost with it; others are not.
                 complain(a, b, error)
                 _rescue_start(rescue, a, max(a, spans[first].stop - lead), b, complain)
-                todo = _without(spans, todo, first, complain)
+                todo = _without_bad_segment(spans, todo, first, complain)
 
 
 def _rescue_start(
@@ -60,7 +57,9 @@ def _rescue_start(
         complain(start, stop, error)
 
 
-def _without(spans: Sequence[Span], todo: list[Run], bad: int, complain: Complain) -> list[Run]:
+def _without_bad_segment(
+    spans: Sequence[Span], todo: list[Run], bad: int, complain: Complain
+) -> list[Run]:
     last = max((run[1] for run in todo), default=0)
     after = bad + 1
     while after < last and not spans[after].fresh:
@@ -70,17 +69,17 @@ def _without(spans: Sequence[Span], todo: list[Run], bad: int, complain: Complai
     return [(max(first, after), stop) for first, stop in todo if stop > after]
 
 
-def _runs(spans: Sequence[Span], wanted: range, complain: Complain) -> list[Run]:
-    """Runs of neighboring segments among those ``wanted``, each from a fresh one on."""
-    start = wanted.start
+def _runs(spans: Sequence[Span], segments: range, complain: Complain) -> list[Run]:
+    """Runs of neighbors among ``segments``, each from a fresh one on."""
+    start = segments.start
     while start > 0 and start < len(spans) and not spans[start].fresh:
         start -= 1
     runs: list[Run] = []
     usable, lost = False, None
-    for index in range(start, wanted.stop):
+    for index in range(start, segments.stop):
         joined = index > start and spans[index - 1].stop == spans[index].first
         usable = spans[index].fresh or (joined and usable)
-        if index < wanted.start:
+        if index < segments.start:
             continue
         if not usable:
             lost = spans[index].first if lost is None else lost
@@ -93,5 +92,5 @@ def _runs(spans: Sequence[Span], wanted: range, complain: Complain) -> list[Run]
         else:
             runs.append((index, index + 1))
     if lost is not None:
-        complain(lost, spans[wanted.stop - 1].stop, LOST_BEFORE)
+        complain(lost, spans[segments.stop - 1].stop, LOST_BEFORE)
     return runs

@@ -20,7 +20,7 @@ from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
 from mcz.container.skeletons import parse_channels
 from mcz.errors import FormatError
-from mcz.model.clock import TIMES, times_form_fault
+from mcz.model.clock import TIMES, times_signal_fault
 from mcz.model.motion import ROLES, Channel, Skeleton
 from mcz.model.numbers import Grid, GridKind
 
@@ -51,7 +51,7 @@ class SignalInfo:
 
     @property
     def has_poses(self) -> bool:
-        """True of a motion whose channels are those of the skeleton."""
+        """True of a motion with the channels of its skeleton."""
         return self.role == "motion" and self.channels is None
 
     @property
@@ -60,7 +60,7 @@ class SignalInfo:
 
     @property
     def codec(self) -> Codec:
-        """Raises UnsupportedError where this reader lacks the codec."""
+        """The codec; raises UnsupportedError if this reader lacks it."""
         return self.own_codec or codec_by_id(self.codec_id, self.codec_version, self.preset)
 
     @property
@@ -79,12 +79,12 @@ class SignalInfo:
         return [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h in headers]
 
     def covering(self, start: int, stop: int) -> range:
-        """The segments whose own frames meet the stored frames start <= f < stop."""
+        """The segments whose own frames overlap the stored frames start <= f < stop."""
         low = bisect_right(self.rows, start, key=lambda row: row.header.stop)
         return range(low, bisect_left(self.rows, stop, key=lambda row: row.header.first))
 
     def coarser(self, resolution: int) -> int:
-        """The details to leave out of a signal beside the motion: no more than it has."""
+        """The number of details to leave out of a signal other than the motion: at most all."""
         return min(resolution, self.counts.n_resolutions - 1)
 
 
@@ -145,7 +145,7 @@ def read_signal(
 
 
 def role_name(role: int) -> str:
-    """The name of a role of the registry, "" of any other."""
+    """The name of a role of the registry, "" for another."""
     return ROLES[role] if role < len(ROLES) else ""  # ROLE-06
 
 
@@ -162,7 +162,7 @@ def check_roles(signals: Sequence[payloads.Signal], where: str) -> None:
 
 
 def _check_times(info: SignalInfo, where: str) -> None:
-    fault = times_form_fault(info)
+    fault = times_signal_fault(info)
     codec = CODECS.find(info.codec_id, info.preset)
     if not fault and codec is not None and not CODECS[codec].lossless:  # ROLE-03
         fault = f"codec {info.codec_id} is lossy"
@@ -171,13 +171,13 @@ def _check_times(info: SignalInfo, where: str) -> None:
 
 
 def read_segments(container: Container, info: SignalInfo) -> None:
-    """Read the segments of a signal that cannot be decoded: their tables hold all the same."""
+    """Read the segments of a signal that cannot be decoded: their tables can still be read."""
     for row in info.rows:
         container.streams(row, info.counts, None)
 
 
 def _model(container: Container, before: int, id_: bytes) -> Model | None:
-    """The model with this id, None where the file has none before this offset, that of the clip."""
+    """The model with this id, None if the file has none before this offset, the clip's."""
     chunk = container.directory.shared.get((ChunkType.MODL, id_))
     if chunk is None or chunk.offset > before:  # GRAM-10
         return None
@@ -192,7 +192,7 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
     due = 0
     for row in info.rows:
         if row.packet == FRAME:
-            # refuses what cannot be such a packet
+            # refuses an impossible packet
             frame_table(row.header, info.counts, row.size, 0)
         if row.header.flags & FRAME_NOTES and not noted:  # NOTES-01
             raise FormatError("frame notes, but no source that they belong to", where=where)
@@ -244,7 +244,7 @@ def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
 
 
 def groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...], list[int]]:
-    """The groups that hold ``columns``, and where each column is among theirs."""
+    """The groups with ``columns``, and the place of each column among theirs."""
     group_of = {c: g for g, group in enumerate(layout.groups) for c in group}
     groups = tuple(dict.fromkeys(sorted(group_of[c] for c in columns)))
     column = {c: i for i, c in enumerate(c for g in groups for c in layout.groups[g])}

@@ -29,7 +29,7 @@ from mcz.kernels import lacks_compiled_kernels
 from mcz.model.indexing import merged_ranges
 from mcz.model.motion import Exceptions, Signal
 from mcz.model.numbers import Grid, GridKind, values_of
-from mcz.model.threads import in_force, in_order, timed, worthwhile
+from mcz.model.threads import map_in_order, thread_limit, timing, useful_threads
 from mcz.model.types import Values
 
 BLOCK_ROWS = 1024  # decoded at a time, at least
@@ -39,7 +39,7 @@ NEIGHBORS = 4  # segments whose streams are kept for a thread
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Frames start <= f < stop: what the codec decoded, values, and mask (None: all valid)."""
+    """Frames start <= f < stop: decoded values, and mask (None: all valid)."""
 
     start: int
     stop: int
@@ -67,7 +67,7 @@ class SignalReader:
         self._cache: dict[int, tuple[StreamTable, dict[int, bytes]]] = {}
         self._read_ones: set[int] = set()  # segments
         self._lock = Lock()  # of both
-        self._threads = container.threads or in_force()
+        self._threads = container.threads or thread_limit()
         layout = info.layout
         self._columns = [c for group in self.groups for c in layout.groups[group]]
         self._grids = tuple(layout.grids[c] for c in self._columns)
@@ -93,7 +93,7 @@ class SignalReader:
     def _read(
         self, start: int, stop: int, ordinals: NDArray[np.int64] | None
     ) -> tuple[Values, NDArray[np.bool_] | None]:
-        """Values and mask; what a codec of ordinals decoded goes to ``ordinals``."""
+        """Values and mask; decoded ordinals are written to ``ordinals``."""
         if self.container.salvage:
             return self._salvage(self._prepare(start, stop), start, stop)
         self._check_size(start, stop)
@@ -131,7 +131,7 @@ class SignalReader:
         return slice((start - base) * per_frame, (stop - base) * per_frame)
 
     def blocks(self, start: int, stop: int, out: Values | None = None) -> Iterator[Block]:
-        """The same block by block; values may lie in ``out``, of all rows, already."""
+        """The same block by block; values may be in ``out``, of all rows, already."""
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)
             self._decode(spans, start, stop)
@@ -142,15 +142,15 @@ class SignalReader:
             own = None
             if out is not None and not self.info.is_integer:
                 own = out[self._rows(start, a, b)]
-            with timed(name, math.prod(self._shape(a, b))):
+            with timing(name, math.prod(self._shape(a, b))):
                 coded = self._decode(spans, a, b)
                 return Block(a, b, coded, *self._finish(coded, a, b, own))
 
-        threads = worthwhile(name, math.prod(self._shape(start, stop)), self._threads)
-        yield from in_order(block, list(self._ranges(start, stop)), threads)
+        threads = useful_threads(name, math.prod(self._shape(start, stop)), self._threads)
+        yield from map_in_order(block, list(self._ranges(start, stop)), threads)
 
     def _near_blocks(self, start: int, stop: int, out: Values) -> Iterator[Block]:
-        """``blocks``; a run of which the range has a part is decoded whole, and kept."""
+        """``blocks``; a run that the range overlaps is decoded whole, and kept."""
         at = start
         if start < stop:
             run = self._run(start)
@@ -168,7 +168,7 @@ class SignalReader:
             yield from self.blocks(at, stop, out[self._rows(start, at, stop)])
 
     def _run(self, frame: int) -> tuple[int, int] | None:
-        """The shown frames that hang together with one; None where they are too many to keep."""
+        """The shown frames that depend on each other; None if they are too many to keep."""
         info, rows = self.info, self.info.rows
         per_frame = math.prod(self._shape(0, 1)) * 8
         most = min(MOST_OF_ONE, self.container.max_decoded) // max(per_frame, 1)
@@ -188,7 +188,7 @@ class SignalReader:
         return (start, stop) if stop - start <= most else None
 
     def _cut(self, run: tuple[int, int], start: int, stop: int) -> Iterator[Block]:
-        """Frames of a run, which is decoded where it is not at hand."""
+        """Frames of a run, which is decoded if not cached."""
         rows = self.info.covering(run[0], run[0] + 1)
         key = self.info.rows[rows[0]].offset, self.groups, self.resolution
         decoded = self.container.runs.get(key)
@@ -205,13 +205,13 @@ class SignalReader:
         yield Block(start, stop, decoded.values[cut], decoded.values[cut], mask)
 
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
-        """The range in blocks of a few segments, which bound the memory beside the result."""
+        """The range in blocks of a few segments, to bound the additional memory."""
         rows = self.info.rows
         least = BARE_BLOCK_ROWS if lacks_compiled_kernels() else BLOCK_ROWS
         for index in self.info.covering(start, stop):
             end = min(rows[index].header.stop, stop)
             full = (end - start) * self.info.layout.samples_per_frame >= least
-            # A block that began amid what hangs together would be decoded from its start.
+            # A block that began within a dependent run would be decoded from its start.
             if full and index + 1 < len(rows) and rows[index + 1].header.flags & FRESH:
                 yield start, end
                 start = end
@@ -219,7 +219,6 @@ class SignalReader:
             yield start, stop
 
     def _decode(self, spans: Sequence[Span], start: int, stop: int) -> Values:
-        """Decode frames; groups of ordinals beside values become values."""
         of_ordinals = self.info.exact
         exact = tuple(group for group in self.groups if group in of_ordinals)
         if not exact:
@@ -252,7 +251,7 @@ class SignalReader:
         )
 
     def _prepare(self, start: int, stop: int) -> list[Span]:
-        """The spans of all segments, after the limit was checked and near ones were read."""
+        """The spans of all segments, after a check of the limit and a read of near ones."""
         self._check_size(start, stop)
         info = self.info
         covering = info.covering(start, stop)
@@ -285,14 +284,14 @@ class SignalReader:
 
     def whole_runs(self, start: int, stop: int) -> list[tuple[int, int]]:
         """The runs of the stored frames start <= f < stop that can be decoded."""
-        spans, found = self._prepare(start, stop), []
+        spans, runs = self._prepare(start, stop), []
 
         def rescue(a: int, b: int) -> None:
             self._finish(self._decode(spans, a, b), a, b)
-            found.append((a, b))
+            runs.append((a, b))
 
         salvage(spans, self.info.covering(start, stop), (start, stop), rescue, lambda *_: None)
-        return merged_ranges(found)
+        return merged_ranges(runs)
 
     def _complain(self, start: int, stop: int, reason: object) -> None:
         self.container.damage.append(f"clip {self.name!r}, frames {start}:{stop}: {reason}")
@@ -323,17 +322,17 @@ class SignalReader:
             return self.container.streams(row, counts, None)
         table = self.container.table(row, counts)
         stored = range(counts.n_resolutions - self.resolution)
-        wanted = [table.codec(r, g) for r in stored for g in self.groups]
+        indices = [table.codec(r, g) for r in stored for g in self.groups]
         for stream_of in (table.group_notes, table.mask):
-            wanted += [i for i in map(stream_of, self.groups) if i is not None]
-        return self.container.streams(row, counts, wanted, table)
+            indices += [i for i in map(stream_of, self.groups) if i is not None]
+        return self.container.streams(row, counts, indices, table)
 
     def _finish(
         self, coded: Values, start: int, stop: int, out: Values | None = None
     ) -> tuple[Values, NDArray[np.bool_] | None]:
-        """Turn ordinals into values, in ``out`` if given; put in exceptions and masks."""
+        """Convert ordinals to values, in ``out`` if given; add exceptions and masks."""
         for index in self.info.covering(start, stop):
-            if index not in self._read_ones:  # the codec wanted nothing of it: it is checked yet
+            if index not in self._read_ones:  # the codec did not read it: check it now
                 self._streams(index)
         exceptions, changes = self.exceptions(start, stop, self._columns)
         values = coded
@@ -343,7 +342,7 @@ class SignalReader:
                     f"signal {self.info.name!r} is of integers, {self.info.codec.name} has none",
                     clip=self.name,
                 )
-            Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
+            Grid(GridKind.INTEGER).magnitudes(coded)  # refuses ordinals out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
             values = values_of(coded, self._grids, changes, out)  # NOTES-09
         if len(exceptions):  # NOTES-10

@@ -22,16 +22,16 @@ from mcz.files.reading.signal_info import SignalInfo
 from mcz.model.schema import build
 from mcz.model.text_format import first_of
 
-MOST_NAMED = 4  # joints of a group whose names are told
+MOST_NAMED = 4  # joints of a group that are named
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """The bytes of one clip by part; ``models`` are those that its codecs need, in the file.
+    """The bytes of one clip by part; ``models`` are the models that its codecs need, in the file.
 
-    ``packets`` is the part of ``overhead`` that goes to framing open DATA and their packets,
-    ``between`` are the whole ancillary chunks between CLIP and CEND, ``template`` is the part of
-    ``source`` that other clips may share.
+    ``packets`` is the part of ``overhead`` that frames open DATA and their packets, ``between`` are
+    the whole ancillary chunks between CLIP and CEND, ``template`` is the part of ``source`` that
+    other clips may share.
     """
 
     payload: int = 0
@@ -84,8 +84,8 @@ def clip_sizes(container: Container, clip: Clip) -> Sizes:
 def file_parts(container: Container, sizes: Iterable[Sizes]) -> dict[str, int]:
     """The bytes of a file by part, which sum to its size; ``sizes`` are those of all its clips.
 
-    What several clips share counts once. "other" is the rest: the signature, HEAD, metadata,
-    aliases, recovery data, and what a later end of the file has replaced.
+    Parts shared by several clips count once. "other" is the rest: the signature, HEAD, metadata,
+    aliases, recovery data, and parts replaced by a later end of the file.
     """
     directory, sizes = container.directory, list(sizes)
     shared: dict[bytes, int] = {ChunkType.SKEL: 0, ChunkType.SRCE: 0, ChunkType.MODL: 0}
@@ -109,7 +109,7 @@ def file_parts(container: Container, sizes: Iterable[Sizes]) -> dict[str, int]:
 
 
 def models_used(signal: SignalInfo) -> tuple[bytes, ...]:
-    """The ids of the models that a signal needs; none where its codec or header is not known."""
+    """The ids of the models that a signal needs; none if its codec or header is unknown."""
     with suppress(UnsupportedError, FormatError):
         if signal.codec.uses is not None:
             return signal.codec.uses(signal.header)
@@ -160,20 +160,20 @@ def _alias_bytes(file: File, name: str) -> int:
 
 
 def file_ratio(file: File) -> float | None:
-    """Bytes of the stored files for a byte of the file, None where nothing says them."""
+    """Bytes of the stored files for a byte of the file, None if unknown."""
     try:
         return _stored_bytes(file) / file.size or None
-    except (FormatError, KeyError):  # salvaged: what they name is lost
+    except (FormatError, KeyError):  # salvaged: the named ones are lost
         return None
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """Bytes of a group's streams of one sort in all segments; with all others the whole payload.
+    """Bytes of a group's streams of one sort in all segments; all of them sum to the payload.
 
-    ``name`` are the joints of the group, or its channels, the first of many. ``resolution`` counts
-    as stored, from 0, the coarsest; None of what is no codec's: exceptions, masks, frame notes
-    (whose group is None).
+    ``name`` lists the joints of the group, or its channels, the first of many. ``resolution``
+    counts as stored, from 0, the coarsest; None outside of the codec: exceptions, masks, frame
+    notes (whose group is None).
     """
 
     signal: str
@@ -184,9 +184,9 @@ class Share:
 
 
 def byte_shares(clip: Clip) -> list[Share]:
-    """The bytes of each group of each signal, by resolution, and beside that; no part is empty.
+    """The bytes of each group of each signal, by resolution and outside of the codec.
 
-    Reads the stream tables alone. The sum is the payload of ``mcz info``.
+    Reads only the stream tables. The sum is the payload of ``mcz info``.
     """
     shares = []
     for signal in clip.signals:
@@ -208,7 +208,7 @@ def byte_shares(clip: Clip) -> list[Share]:
 def by_group(shares: Iterable[Share]) -> dict[str, dict[int | None, int]]:
     """The bytes by the joints of a group, then by resolution, in the order of ``shares``.
 
-    The names begin with that of the signal where several have bytes.
+    The names begin with the signal's if several have bytes.
     """
     shares = list(shares)
     several = len({share.signal for share in shares}) > 1
@@ -239,12 +239,12 @@ class _Segment:
 def layout(file: File) -> list[tuple[int, int, str]]:
     """(offset, size, meaning) of every byte range of the file, in order, without gaps."""
     container = file.container
-    found = scan(container.source, salvage=container.salvage)
+    scanned = scan(container.source, salvage=container.salvage)
     parts: list[tuple[int, int, str]] = [(0, len(SIGNATURE), "signature")]
     tables = dict(_segment_tables(file))
-    for chunk in found.chunks:
+    for chunk in scanned.chunks:
         parts += _chunk_parts(chunk, tables)
-    parts += [(at, FOOT.size, "FOOT") for at in found.feet]
+    parts += [(at, FOOT.size, "FOOT") for at in scanned.feet]
     for at, segment in tables.items():
         if segment.in_packet:
             parts += _segment_parts(at, segment)
@@ -272,8 +272,7 @@ def _segment_tables(file: File) -> Iterator[tuple[int, _Segment]]:
 
 
 def group_names(clip: Clip, signal: SignalInfo) -> list[tuple[int, str]]:
-    """Number and joints of each group; for one channel, or a signal that has no joints,
-    its channels."""
+    """Number and joints of each group; its channels for one channel, or a signal without joints."""
     if signal.channels is not None:
         owners = channels = [c.label or f"channel-{n}" for n, c in enumerate(signal.channels)]
     else:
@@ -315,7 +314,7 @@ def _segment_parts(at: int, segment: _Segment) -> Iterator[tuple[int, int, str]]
             if table.counts.n_resolutions > 1:
                 text += f", stored resolution {resolution}"
             names[table.codec(resolution, group)] = text
-    implied = None if table.size else table.mask(0)  # it lies in a packet before
+    implied = None if table.size else table.mask(0)  # it is in an earlier packet
     for index, (offset, length) in enumerate(zip(table.offsets, table.lengths, strict=True)):
         if length and index != implied:
             yield at + offset, length, names[index]

@@ -1,4 +1,4 @@
-"""Source files on disk -> Motion or Skeleton, with what the caller says and the file does not."""
+"""Source files on disk -> Motion or Skeleton, with facts from the caller."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
 
 def load(path: Path) -> tuple[Format, bytes]:
     """The format of a source file, see ``format_of``, and its bytes; raises SourceError."""
-    if not has_known_suffix(path):  # it is refused, whatever it holds
+    if not has_known_suffix(path):  # refused, whatever its content
         format_of(path, _start_of(path))
     data = read_bytes(path)
     return format_of(path, data), data
 
 
 def content_note(path: str | os.PathLike[str], source_format: Format) -> str:
-    """A remark on a file whose suffix is not that of its format, "" where it is."""
+    """A remark on a file whose suffix does not fit its format, "" if it does."""
     suffix = Path(path).suffix.lower()
     if suffix in source_format.suffixes:
         return ""
@@ -72,10 +72,14 @@ def _read_with(path: Path, reader: Any, data: bytes, *arguments: object) -> Any:
 
 
 def _other_content(path: Path, data: bytes) -> str | None:
-    """A note where a file that cannot be read begins as one of another suffix does."""
+    """A note if an unreadable file begins like one of another suffix."""
     formats = [FORMATS[name] for name in likely_formats(data)]
-    found = [known.suffix for known in formats if known.is_motion is None or known.is_motion(data)]
-    return f"it looks like {found[0]}" if found and path.suffix.lower() not in found else None
+    suffixes = [
+        known.suffix for known in formats if known.is_motion is None or known.is_motion(data)
+    ]
+    return (
+        f"it looks like {suffixes[0]}" if suffixes and path.suffix.lower() not in suffixes else None
+    )
 
 
 def _start_of(path: Path) -> bytes:
@@ -98,13 +102,13 @@ class SourceOptions:
     """Facts about a source file that its caller states.
 
     ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit``,
-    ``up``, the axis that points up ("y", "-z"), ``forward``, the one that a figure faces, and
-    ``handedness`` ("right", "left") say what the file does not; ``force_rate``: the rate holds also
-    where the file states one. ``arrays`` says what plain arrays are, ``model`` how long the bones
-    of bodies are, see ``mcz.read``. ``verbatim``: a file that cannot be parsed is kept as an
-    attachment. ``keep_skeleton``: an ASF is restored as well, under its own name. ``flat``: a file
-    for which several skeletons around may be meant is kept without one. Raises OptionError for an
-    unknown unit, axis, kind of arrays, or a rate that is no positive number.
+    ``up``, the axis that points up ("y", "-z"), ``forward``, the facing of a figure, and
+    ``handedness`` ("right", "left") apply if the file states none; ``force_rate``: the rate applies
+    also if the file states one. ``arrays`` is the meaning of plain arrays, ``model`` has the
+    lengths of bones of bodies, see ``mcz.read``. ``verbatim``: a file that cannot be parsed is kept
+    as an attachment. ``keep_skeleton``: an ASF is restored as well, under its own name. ``flat``: a
+    file with several possible skeletons nearby is read without one. Raises OptionError for an
+    unknown unit, axis, kind of arrays, or a rate that is not a positive number.
     """
 
     skeleton: str | os.PathLike[str] | None = None
@@ -152,7 +156,7 @@ class SourceOptions:
         return motion
 
     def completing(self, motion: Motion) -> Motion:
-        """``motion`` with those of the facts that it does not say itself."""
+        """``motion`` with the facts that it lacks."""
         skeleton = motion.skeleton
         unknown = replace(
             self,
@@ -166,7 +170,7 @@ class SourceOptions:
 
 
 def parse_rate(rate: Fraction | float) -> Fraction:
-    """``rate`` as a Fraction; raises OptionError where it is no positive number."""
+    """``rate`` as a Fraction; raises OptionError unless it is a positive number."""
     try:
         exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))
         value = exact.limit_denominator(2**52)

@@ -1,4 +1,4 @@
-"""A clip's source file: its facts, its parts put together, and what it says of the numbers."""
+"""A clip's source file: its facts, its parts joined, and the meaning of its numbers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mcz.sources import FORMATS, Format, format_by_id, recording_of
 if TYPE_CHECKING:
     from mcz.sources.c3d.recording import Recording
 
-ANALOG = "analog"  # the role of signals whose stored numbers a source may have a meaning for
+ANALOG = "analog"  # the role of signals whose stored numbers a source may scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class SourceInfo:
 
 
 def source_facts(source: SourceInfo | Source | None) -> JsonObject:
-    """Path, size and hash as the documents have them, None where there is no source."""
+    """Path, size and hash for documents, None without a source."""
     return {
         "source_path": source.path if source else None,
         "source_bytes": source.size if source else None,
@@ -54,7 +54,7 @@ def source_facts(source: SourceInfo | Source | None) -> JsonObject:
 
 
 def source_info(fields: payloads.Clip, cend: payloads.Cend | None) -> SourceInfo | None:
-    """The facts in CLIP and CEND of a clip (None: it has no CEND); None where it has no source."""
+    """The facts in CLIP and CEND of a clip (None: it has no CEND); None without a source."""
     if not fields.source:
         return None
     source = fields.source
@@ -64,7 +64,7 @@ def source_info(fields: payloads.Clip, cend: payloads.Cend | None) -> SourceInfo
 
 
 def known_format(fields: payloads.Clip) -> Format | None:
-    """The source format of a clip whose CLIP is ``fields``; None: none that is known."""
+    """The source format of a clip whose CLIP is ``fields``; None if unknown."""
     if not fields.source:
         return None
     try:
@@ -82,7 +82,7 @@ def read_source(
 ) -> Source:
     """The source of the stored ``frames`` of a clip; ``fields`` are those of CLIP_SOURCE.
 
-    ``signal`` is the clip's motion, whose segments hold the notes. Raises FormatError.
+    ``signal`` is the clip's motion, whose segments contain the notes. Raises FormatError.
     """
     source_format = format_by_id(fields.format)
     template = container.template(fields.template, fields.format)
@@ -139,7 +139,7 @@ def _skeleton_source(container: Container, id_: bytes) -> Source | None:
 
 
 def stating_rate(motion: Motion, numbers: NDArray[np.int64] | None = None) -> Motion:
-    """``motion`` with a source that states its rate; as it is where it cannot, or states none.
+    """``motion`` with a source that states its rate; unchanged if it cannot, or states none.
 
     ``numbers``: all frame numbers of a clip that it is a part of. Raises FormatError on bad bytes.
     """
@@ -147,10 +147,10 @@ def stating_rate(motion: Motion, numbers: NDArray[np.int64] | None = None) -> Mo
     if source is None or rate is None:
         return motion
     step = usual_step(motion.frame_numbers if numbers is None else numbers)
-    found = contradiction(source.format, source.template, rate, step)
-    if found is None:
+    restated = contradiction(source.format, source.template, rate, step)
+    if restated is None:
         return motion
-    return replace(motion, source=replace(source, template=found.template))
+    return replace(motion, source=replace(source, template=restated.template))
 
 
 def is_one_of(ratio: Fraction, step: int) -> bool:
@@ -159,16 +159,16 @@ def is_one_of(ratio: Fraction, step: int) -> bool:
 
 
 def contradiction(format_name: str, template: bytes, rate: Fraction, step: int) -> Any:
-    """The result of ``Format.restate`` where the template states another rate; else None."""
+    """The result of ``Format.restate`` if the template states another rate; else None."""
     restate = FORMATS[format_name].restate
-    found = restate(template, rate) if restate is not None else None
-    return None if found is None or is_one_of(found.rate / rate, step) else found
+    restated = restate(template, rate) if restate is not None else None
+    return None if restated is None or is_one_of(restated.rate / rate, step) else restated
 
 
 def recording(motion: Motion) -> Recording | None:
-    """The facts that the source of ``motion`` states beside all numbers; None where it has none.
+    """The facts that the source of ``motion`` states besides all numbers; None if there are none.
 
-    Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is that of a clip.
+    Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is a clip's.
     Raises FormatError on bad bytes.
     """
     source = motion.source
@@ -176,23 +176,23 @@ def recording(motion: Motion) -> Recording | None:
 
 
 def _on_clock(source: Source, rate: Fraction | None) -> Recording | None:
-    """The recording of a source, its times corrected where the clip's ``rate`` corrects its own."""
-    found: Recording | None = recording_of(source)
-    if found is None or rate is None:
-        return found
+    """The recording of a source, its times corrected if the clip's ``rate`` corrects its own."""
+    recorded: Recording | None = recording_of(source)
+    if recorded is None or rate is None:
+        return recorded
     stated = contradiction(source.format, source.template, rate, 1)
     if stated is None or not stated.rate:
-        return found
+        return recorded
     factor = float(stated.rate / rate)
-    events = tuple(replace(event, time=event.time * factor) for event in found.events)
-    samples = found.analog_rate and found.analog_rate / factor
-    return replace(found, events=events, analog_rate=samples)
+    events = tuple(replace(event, time=event.time * factor) for event in recorded.events)
+    samples = recorded.analog_rate and recorded.analog_rate / factor
+    return replace(recorded, events=events, analog_rate=samples)
 
 
 def read_recording(
     container: Container, fields: payloads.Clip, rate: Fraction | None = None
 ) -> Recording | None:
-    """The recording that the source of a clip, whose CLIP is ``fields``, tells of."""
+    """The recording in the source of a clip, whose CLIP is ``fields``."""
     form = known_format(fields)
     source = fields.source
     if form is None or form.recording is None or source is None:
@@ -204,12 +204,12 @@ def read_recording(
 def scaling_of(
     signals: Sequence[SignalInfo], index: int, recording: Callable[[], Recording | None]
 ) -> Scaling | None:
-    """The meaning of the stored numbers of a signal; None where they are the values themselves."""
+    """The scaling of the stored numbers of a signal; None if they are the values themselves."""
     analog = next((info for info in signals if info.role == ANALOG), None)
     if analog is None or analog.index != index:
         return None
-    told = recording()
-    scaling = None if told is None else told.scaling
+    recorded = recording()
+    scaling = None if recorded is None else recorded.scaling
     n_channels = analog.layout.n_channels
     if scaling is not None and len(scaling.scales) != n_channels:
         raise FormatError(

@@ -40,11 +40,11 @@ LISTS = ("cut-joints", "edit-joints")
 JOINTS = ("shell_max_joint", "slide_max_joint")
 POINT = "max_position_error_point"
 WORDS = ("param.contacts", "param.lossless", "param.quality")  # joints, or groups of them
-REACHED = "quality_reached."  # the key of what such a joint or group has reached
+REACHED = "quality_reached."  # before a joint or group: its reached quality
 _BEFORE = re.compile(r"(?:uncut_|unedited_|edit_)*")
 _WORD = re.compile(r"(.*?)((?::[0-9]+\+[0-9]+|=[^=,]*)?)")  # a joint, and its frames or limit
 _INDEX = re.compile(r"0|[1-9][0-9]{0,15}")
-Lookup = Callable[[str], str | None]  # None: there is no such joint
+Lookup = Callable[[str], str | None]  # None: unknown joint
 
 
 class StoredClip:
@@ -98,7 +98,7 @@ class StoredClip:
 
     @cached_property
     def metadata(self) -> Mapping[str, str]:
-        """Keys of the registry, or ``x-...``, and texts, as META chunks have changed them."""
+        """Keys of the registry, or ``x-...``, and texts, as changed by META chunks."""
         return self.container.metadata(self._row)
 
     @cached_property
@@ -107,7 +107,7 @@ class StoredClip:
 
     @property
     def frame_numbers(self) -> NDArray[np.int64]:
-        """The number of every frame, ascending: 1, 2, 3, ... where there is no time base."""
+        """The number of every frame, ascending: 1, 2, 3, ... without a time base."""
         where = f"clip {self.name!r}: frame numbers"
         check_decoded(where, 8 * self.n_frames, self.container.max_decoded)
         whole = not self.container.salvage
@@ -115,7 +115,7 @@ class StoredClip:
 
     @property
     def first_time(self) -> float | None:
-        """The time of the first frame in seconds, None where its number and the rate tell it."""
+        """The time of the first frame in seconds, None if its number and the rate imply it."""
         return None if self._time_base is None else self._time_base.first_time
 
     @property
@@ -125,7 +125,7 @@ class StoredClip:
 
     @cached_property
     def signals(self) -> tuple[SignalInfo, ...]:
-        """The signals; the motion, where there is one, is the first."""
+        """The signals; the motion, if there is one, is the first."""
         fields = self._fields
         if not fields.signals:  # CLIP-05
             raise FormatError("it has no signal", clip=self.name)
@@ -138,7 +138,7 @@ class StoredClip:
 
     @property
     def motion_signal(self) -> SignalInfo | None:
-        """The signal with the role "motion", which is the first; None where there is none."""
+        """The signal with the role "motion", the first; None if there is none."""
         return self.signals[0] if self.signals[0].role == "motion" else None
 
     def signals_of(self, role: str) -> tuple[SignalInfo, ...]:
@@ -147,7 +147,7 @@ class StoredClip:
 
     @property
     def n_channels(self) -> int:
-        """Channels of the first signal, which is the motion."""
+        """Channels of the first signal, the motion."""
         return self._row.signals[0].n_channels
 
     def __len__(self) -> int:
@@ -155,7 +155,7 @@ class StoredClip:
         return self.n_frames
 
     def __bool__(self) -> bool:
-        """True: a clip without frames is a clip, too."""
+        """True, also without frames."""
         return True
 
     @property
@@ -164,7 +164,7 @@ class StoredClip:
         return self.n_frames, self.n_channels
 
     def checked_range(self, frames: tuple[int, int] | None) -> tuple[int, int]:
-        """``frames``, or all; raises OptionError where they are not in the clip."""
+        """``frames``, or all; raises OptionError if they are not in the clip."""
         if frames is None:
             return 0, self.n_frames
         try:
@@ -179,7 +179,7 @@ class StoredClip:
 
     @property
     def codec(self) -> str:
-        """Name of the codec of the motion signal, ``codec N`` where it is unknown."""
+        """Name of the codec of the motion signal, ``codec N`` if it is unknown."""
         row = self._row.signals[0]
         try:
             return codec_by_id(row.codec, row.codec_version, row.preset).name
@@ -188,18 +188,18 @@ class StoredClip:
 
     @property
     def source(self) -> SourceInfo | None:
-        """Format, path, size and hash of the source file; None where the clip has none."""
+        """Format, path, size and hash of the source file; None without one."""
         return source_info(self._fields, self._cend)
 
     @property
     def quality(self) -> dict[str, str] | None:
-        """The quality record, with joints by name; None where the clip has none."""
+        """The quality record, with joints by name; None without one."""
         stored = self.stored_quality
         return None if stored is None else with_names(stored, self.skeleton)
 
     @property
     def stored_quality(self) -> dict[str, str] | None:
-        """The quality record as it is stored, with joints by index."""
+        """The quality record as stored, with joints by index."""
         for chunk in self._row.ancillary:
             if chunk.type == ChunkType.QUAL:
                 fields = parse(payloads.Qual, self.container.payload(chunk), chunk.label)
@@ -219,9 +219,9 @@ class StoredClip:
 
     @cached_property
     def recording(self) -> Recording | None:
-        """Facts in the source beside all numbers: events, force platforms, units, descriptions.
+        """Facts in the source besides all numbers: events, force platforms, units, descriptions.
 
-        None where it says nothing of the kind: only C3D does. Raises FormatError on bad bytes.
+        None without any: only C3D has them. Raises FormatError on bad bytes.
         """
         try:
             return self._recording()
@@ -233,9 +233,9 @@ class StoredClip:
         return read_recording(self.container, self._fields, self.frame_rate)
 
     def scaling(self, signal: int) -> Scaling | None:
-        """The meaning of the stored numbers of a signal; None: they are the values; FormatError.
+        """The scaling of the stored numbers of a signal; None: they are the values; FormatError.
 
-        None also where salvage finds the source damaged that told it: the numbers are whole.
+        None also if salvage finds its source damaged: the numbers are intact.
         """
         try:
             return scaling_of(self.signals, signal, self._recording)
@@ -245,7 +245,7 @@ class StoredClip:
             return None
 
     def is_scaled(self, signal: int) -> bool:
-        """Return whether a signal's source tells a meaning of its stored numbers, or told it."""
+        """Return whether a signal's source scales its stored numbers, or did before damage."""
         try:
             return scaling_of(self.signals, signal, self._recording) is not None
         except FormatError:
@@ -254,7 +254,7 @@ class StoredClip:
             return True
 
     def _complain(self, text: str, error: FormatError) -> None:
-        """Add to what salvage found wrong, once; raise ``error`` where nothing is salvaged."""
+        """Add to the damage found by salvage, once; raise ``error`` without salvage."""
         if not self.container.salvage:
             raise error
         line = f"clip {self.name!r}: {text}"
@@ -280,7 +280,7 @@ def with_names(entries: Mapping[str, str], skeleton: Skeleton) -> dict[str, str]
 
 
 def with_indices(entries: Mapping[str, str], skeleton: Skeleton) -> dict[str, str]:
-    """The entries as a file has them; joints that ``skeleton`` has not are left out."""
+    """The entries as a file has them; joints that ``skeleton`` lacks are left out."""
     return _translated(entries, _index_of(skeleton.addresses()), _index_of(point_names(skeleton)))
 
 
@@ -302,7 +302,7 @@ def _index_of(names: Sequence[str]) -> Lookup:
 
 
 def _translated(entries: Mapping[str, str], joint: Lookup, point: Lookup) -> dict[str, str]:
-    found = {}
+    translated = {}
     for key, value in entries.items():
         before = _BEFORE.match(key)
         assert before is not None
@@ -317,5 +317,5 @@ def _translated(entries: Mapping[str, str], joint: Lookup, point: Lookup) -> dic
             known = joint(name.removeprefix(REACHED))
             name = "" if known is None else REACHED + known
         if name and (text or not value):
-            found[start + name] = text
-    return found
+            translated[start + name] = text
+    return translated

@@ -1,4 +1,4 @@
-"""A report of a verification, to be filed beside an archive: what was checked, and what it held."""
+"""A report of a verification, to be filed with an archive: the checks, and the contents."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ NOT_CHECKED = {
     "unopened": ("all else, for the file cannot be opened",),
 }
 
-Part = Params  # kind, name and problems of a part, as ``mcz verify --json`` has them
+Part = Params  # kind, name and problems of a part, as in ``mcz verify --json``
 
 
 def bytes_facts(source: ByteSource) -> JsonObject:
-    """Name, size and SHA-256 of a file, whatever it is."""
+    """Name, size and SHA-256 of a file of any content."""
     digest = hashlib.sha256()
     for at in range(0, source.size, BLOCK):
         digest.update(source.read(at, min(BLOCK, source.size - at)))
@@ -47,7 +47,7 @@ def contents(file: File) -> JsonObject:
     """List the contents of a file without decoding."""
     clips = [_clip(clip) for clip in file]
     skeletons = [_skeleton(file, id_) for id_, _ in file.skeletons]
-    attachments = [_attachment(file, held) for held in file.attachments.values()]
+    attachments = [_attachment(file, attachment) for attachment in file.attachments.values()]
     aliases = [
         {"name": name, "of": kind, "target": target}
         for name, (kind, target) in ((name, file.alias_of(name)) for name in file.aliases)
@@ -89,7 +89,7 @@ def _files(
 def _clip(clip: Clip) -> JsonObject:
     try:
         source = clip.source
-    except MczError:  # which is among the problems
+    except MczError:  # already among the problems
         source = None
     return {"name": clip.name, "n_frames": clip.n_frames, **source_facts(source)}
 
@@ -102,13 +102,13 @@ def _skeleton(file: File, id_: bytes) -> JsonObject:
     return {"name": skeleton.name or id_.hex(), "id": id_.hex(), **source_facts(skeleton.source)}
 
 
-def _attachment(file: File, held: Attachment) -> JsonObject:
-    part = file.container.directory.attachments[held.name].parts[0]
+def _attachment(file: File, attachment: Attachment) -> JsonObject:
+    part = file.container.directory.attachments[attachment.name].parts[0]
     try:
         sha256 = parse(payloads.Atta, file.container.payload(part), part.label).sha256.hex()
     except MczError:
         sha256 = None
-    return {"name": held.name, "bytes": held.size, "sha256": sha256}
+    return {"name": attachment.name, "bytes": attachment.size, "sha256": sha256}
 
 
 def report(
@@ -122,9 +122,9 @@ def report(
 ) -> JsonObject:
     """The report as a document, ready for JSON; docs/reference/scripts.md lists its keys.
 
-    ``facts``: those of ``bytes_facts``, and of ``contents`` where the file could be opened.
-    ``parts``: what the verification says of each part. ``chosen``: the query of the clips that a
-    full check decoded, None for all of them.
+    ``facts``: those of ``bytes_facts``, and of ``contents`` if the file could be opened. ``parts``:
+    the result of each part. ``chosen``: the query of the clips that a full check decoded, None for
+    all of them.
     """
     mode, rows = "quick" if quick else "full", list(parts)
     done = mode if quick or "format_version" in facts else "unopened"
@@ -149,8 +149,8 @@ def report(
     ]
     for kind in ("clip", "skeleton", "attachment"):
         document[f"{kind}s"] = [
-            {**held, "result": _result(faults.get((kind, held["name"])), quick)}
-            for held in facts.get(f"{kind}s", ())
+            {**fact, "result": _result(faults.get((kind, fact["name"])), quick)}
+            for fact in facts.get(f"{kind}s", ())
         ]
     document["aliases"] = list(facts.get("aliases", ()))
     return document
@@ -163,7 +163,7 @@ def _result(problems: list[str] | None, quick: bool) -> str:
 
 
 def text_lines(document: Params) -> list[str]:
-    """The report as text, each name on one line and without what would steer a terminal."""
+    """The report as text, each name on one line and without control characters."""
     lines = [_fact("size", f"{document['file_bytes']:,} bytes")]
     lines.append(_fact("SHA-256", document["sha256"]))
     if "format_version" in document:

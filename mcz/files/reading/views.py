@@ -19,7 +19,7 @@ from mcz.model.types import Values
 
 
 class Masked(NamedTuple):
-    """Numbers as they are stored, and which of them are valid (bool, same shape; None: all)."""
+    """Numbers as stored, and their validity (bool, same shape; None: all)."""
 
     values: Values
     mask: NDArray[np.bool_] | None
@@ -50,7 +50,7 @@ class ClipValues:
     def __getitem__(self, key: Any) -> Values:
         """Frames, and some of their channels: ``[100]``, ``[10:20, 3:6]``, as of an array.
 
-        Only the frames that are asked for are decoded, from the first to the last of them.
+        Only the requested frames are decoded, from the first to the last of them.
         """
         rows, *rest = (key if isinstance(key, tuple) else (key,)) or (Ellipsis,)
         if not _is_one_axis(rows):
@@ -58,10 +58,10 @@ class ClipValues:
             return whole
         chosen = row_numbers(rows, len(self), "frame")
         first, stop = _span(chosen)
-        found = self._read(frames=(first, stop))
+        values = self._read(frames=(first, stop))
         if isinstance(chosen, range):
-            return found[(slice(None, None, chosen.step), *rest)]
-        part: Values = found[(chosen - first, *rest)]
+            return values[(slice(None, None, chosen.step), *rest)]
+        part: Values = values[(chosen - first, *rest)]
         return part
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Values:
@@ -88,8 +88,8 @@ def _span(rows: Rows) -> tuple[int, int]:
 class Preview:
     """Some frames of a clip, ascending and counted from 0; a row of values for each.
 
-    ``mask`` is None where all values are valid. ``step``: the frames between two of them, but for
-    the last, which may be nearer.
+    ``mask`` is None where all values are valid. ``step``: the frames between two of them; only the
+    last may be nearer.
     """
 
     frames: NDArray[np.int64]
@@ -99,7 +99,7 @@ class Preview:
 
     @property
     def is_regular(self) -> bool:
-        """True where every frame is ``step`` behind the one before."""
+        """True where every frame is ``step`` after the one before."""
         return bool((np.diff(self.frames) == self.step).all())
 
     def masked(self) -> Values:
@@ -111,8 +111,7 @@ def preview(
 ) -> Preview:
     """The frames that a clip of ``n_frames`` can show without decoding the rest.
 
-    ``reader`` reads the motion signal in its coarsest resolution; of what it gives these
-    ``columns`` are kept.
+    ``reader`` reads the motion signal in its coarsest resolution, of which ``columns`` are kept.
     """
     info = reader.info
     frames, step = _preview_frames(info, n_frames, reader.name)
@@ -134,7 +133,7 @@ def preview(
 
 
 def _preview_frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray[np.int64], int]:
-    """The frames that are shown, counted from the first of the clip, and how far apart they are."""
+    """The shown frames, counted from the first of the clip, and their distance."""
     codec = info.codec
     if codec.preview is not None:
         stored = codec.preview(info.header, info.layout, info.spans)
@@ -187,7 +186,7 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
     n_frames = -(-signal.n_frames // step)
     changes = {}
     for row, channel, grid in sorted(signal.grid_changes, key=lambda change: change[0]):
-        frame = -(-(row // per_frame) // step)  # the first kept one that it holds for
+        frame = -(-(row // per_frame) // step)  # the first kept one that it applies to
         if frame < n_frames:
             changes[frame * per_frame, channel] = grid
 
@@ -210,7 +209,7 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
 
 
 def pick_notes(join_notes: JoinNotes, notes: FrameNotes, frames: range) -> FrameNotes:
-    """The notes of some frames alone, numbered from 0."""
+    """The notes of some frames, numbered from 0."""
     if frames.step == 1:
         return notes.part(frames.start, frames.stop)
     return join_notes([(i, i + 1, notes.cut(f, f + 1)) for i, f in enumerate(frames)])

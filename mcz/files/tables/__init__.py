@@ -1,6 +1,6 @@
 """Motions for other libraries: NPZ that needs no MCZ, xarray and pandas.
 
-xarray and pandas are imported when they are asked for.
+xarray and pandas are imported on first use.
 """
 
 from __future__ import annotations

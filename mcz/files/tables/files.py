@@ -37,14 +37,14 @@ class Table:
     mask: NDArray[np.bool_]
     frame_numbers: NDArray[np.int64]
     frame_rate: Fraction | None
-    units: Sequence[str] = ()  # of the columns, "" where unknown; none: those of the skeleton
-    motion: Motion | None = None  # whose channels these are, all of them
+    units: Sequence[str] = ()  # of the columns, "" where unknown; empty: those of the skeleton
+    motion: Motion | None = None  # the motion with exactly these channels
     times: NDArray[np.float64] | None = None
     samples_per_frame: int = 1
 
 
 def table_of(motion: Motion) -> Table:
-    """The channels of the motion signal, with all that an NPZ says of its poses beside."""
+    """The channels of the motion signal, with all facts of its poses for an NPZ."""
     signal = motion.signals[0]
     mask = np.ones(signal.values.shape, np.bool_) if signal.mask is None else signal.mask
     numbers, timeline = numbers_or_rows(motion.frame_numbers, motion.n_frames), motion.timeline
@@ -62,10 +62,9 @@ def table_of(motion: Motion) -> Table:
 
 
 def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> list[str]:
-    """``joint.channel`` of every column, of a joint that is one number its name alone; ``joint#n``
-    where that repeats.
+    """``joint.channel`` of every column, or ``joint`` with one number; ``joint#n`` if repeated.
 
-    Of a signal with ``own`` channels their names, or ``channel-n`` where one has none.
+    Of a signal with ``own`` channels their names, or ``channel-n`` without one.
     """
     if own is not None:
         return [channel.label or f"channel-{n}" for n, channel in enumerate(own)]
@@ -85,17 +84,17 @@ def is_number(joint: Joint) -> bool:
 
 
 def channel_units(skeleton: Skeleton, own: Sequence[Channel] | None) -> list[str]:
-    """The unit of every column, "" where the channel does not say it."""
+    """The unit of every column, "" if the channel states none."""
     return [channel.unit for channel in (skeleton.channels if own is None else own)]
 
 
 def to_csv(table: Table) -> bytes:
     """UTF-8 text: a header row, then a row a frame; an invalid value is an empty cell.
 
-    Columns ``frame`` and, in seconds and where times are known, ``time`` come first. Units follow
-    the names, in brackets. What would steer a terminal is escaped in both, as text it is often
-    printed on one, and an apostrophe stands before what a spreadsheet would run. Values are the
-    shortest decimals that read back as the same binary64.
+    Columns ``frame`` and, in seconds if times are known, ``time`` come first. Units follow the
+    names, in brackets. Control characters are escaped in both, since text is often printed on a
+    terminal, and an apostrophe precedes text that a spreadsheet would run. Values are the shortest
+    decimals that read back as the same binary64.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -116,10 +115,10 @@ def to_csv(table: Table) -> bytes:
 
 
 def to_npz(table: Table) -> bytes:
-    """A NumPy archive of values, mask, frame_numbers, frame_rate, names and, where they are known,
-    times and units; of a whole motion with its skeleton and poses (``pose_arrays``), too.
+    """A NumPy archive of values, mask, frames, rate, names and, if known, times and units.
 
-    ``sample_rate`` counts rows a second, of which a frame may have several. No pickles.
+    Of a whole motion also its skeleton and poses (``pose_arrays``). ``sample_rate`` counts rows a
+    second, of which a frame may have several. No pickles.
     """
     rate = table.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) >= 2**63:
@@ -162,7 +161,7 @@ ABOUT = (
 def pose_arrays(motion: Motion) -> dict[str, Items]:
     """Skeleton, rotations, translations and positions of a motion, by name; see ``ABOUT``.
 
-    Rotations and places are left out where the skeleton has no kinematics.
+    Rotations and positions are left out if the skeleton has no kinematics.
     """
     skeleton = motion.skeleton
     known: dict[str, Items] = {

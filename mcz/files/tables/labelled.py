@@ -38,10 +38,10 @@ def to_xarray(
 
     ``positions`` (time, point, axis) in length units or ``unit``; ``rotations`` (time, joint,
     rotation), local, as ``form``: quat, rotvec, 6d or euler (XYZ); ``channels`` (time, channel),
-    the numbers of the file. Each other signal stands under its name (time_NAME, channel_NAME).
-    ``time`` is in seconds (see ``mcz.times``), in frames from 0 on while that is unknown; ``frame``
-    has the source's frame numbers. Facts are in ``attrs``; what is invalid is NaN. Without
-    kinematics there are channels alone. Raises OptionError.
+    the numbers of the file. Each other signal has its name (time_NAME, channel_NAME). ``time`` is
+    in seconds (see ``mcz.times``), in frames from 0 on if unknown; ``frame`` has the source's frame
+    numbers. Facts are in ``attrs``; invalid values are NaN. Without kinematics there are only
+    channels. Raises OptionError.
     """
     if form not in COMPONENTS:
         raise OptionError(f"rotations as {form!r}: one of {', '.join(COMPONENTS)}")
@@ -77,7 +77,7 @@ def to_xarray(
 def _add_signal(motion: Motion, signal: Signal, variables: Settings, coordinates: Settings) -> None:
     name = signal.name
     while {name, f"time_{name}", f"channel_{name}"} & {*variables, *coordinates}:
-        name = f"signal_{name}"  # of another, or one of ours
+        name = f"signal_{name}"  # used by another, or by us
     axis, channel = f"time_{name}", f"channel_{name}"
     variables[name] = ((axis, channel), signal.masked(), {})
     coordinates[axis] = (axis, *_times(motion, signal))
@@ -106,7 +106,7 @@ def _unit(unit_cm: float | None) -> str:
 
 
 def _facts(motion: Motion) -> Settings:
-    """Texts and numbers alone, which every store of xarray keeps."""
+    """Only texts and numbers, which every store of xarray keeps."""
     skeleton, rate = motion.skeleton, motion.frame_rate
     facts: Settings = {"name": motion.name, "up_axis": skeleton.up_axis or "unknown"}
     if skeleton.forward_axis:
@@ -137,10 +137,10 @@ def to_pandas(
 
     ``what``: "positions", "velocities", "accelerations"; local rotations as "quat", "rotvec", "6d"
     or "euler" (XYZ); "channels"; or the name of another signal, such as "analog". A row a frame, or
-    a sample, indexed by its time in seconds ("time", see ``mcz.times``), or by rows ("frame") while
-    that is unknown. Columns are pairs of a joint or point and a component, ``flat``: texts
-    "lfoot.x"; of channels and signals always texts. What is invalid is NaN. Raises OptionError for
-    another ``what``, and as ``mcz.positions``.
+    a sample, indexed by its time in seconds ("time", see ``mcz.times``), or by rows ("frame") if
+    unknown. Columns are pairs of a joint or point and a component, ``flat``: texts "lfoot.x"; of
+    channels and signals always texts. Invalid values are NaN. Raises OptionError for another
+    ``what``, and as ``mcz.positions``.
     """
     pandas = import_extra("pandas", "pandas")
     signals = {signal.name: signal for signal in motion.signals[1:]}

@@ -1,1 +1,1 @@
-"""Values -> files: motions and source files to clips, targets met, files whole or not there."""
+"""Values -> files: motions and source files to clips, targets met, files complete or absent."""

@@ -1,4 +1,4 @@
-"""Writing a file so that it has its name only when it is whole, and never in place of an input."""
+"""Writing a file that gets its name only when it is complete, and never replaces an input."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from mcz.hints import Hint
 from mcz.model.types import Target
 
 SUFFIX = ".part"
-SHOWN = 48  # characters of a name in that of its temporary file: 192 bytes of 255 at most
+SHOWN = 48  # characters of a name in its temporary file's: 192 bytes of 255 at most
 FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)  # errors that only writing has
 
 
-LOCAL = ("file", "local")  # protocols of fsspec whose files are those of this machine
+LOCAL = ("file", "local")  # protocols of fsspec for files of this machine
 
 
 @contextmanager
 def replacing(target: Target, *, force: bool, inputs: Iterable[object] = ()) -> Iterator[BinaryIO]:
-    """A binary stream whose bytes become ``target`` only when the block ends well.
+    """A binary stream whose bytes become ``target`` only when the block succeeds.
 
-    On disk that is a temporary file beside the target, synced and renamed; a device or a pipe, and
-    a stream that was given, are written as they are. Raises OptionError where the target is one of
-    ``inputs``, whatever ``force`` says, ExistsError where it exists and not ``force``, AccessError
-    where it cannot be written.
+    On disk that is a temporary file next to the target, synced and renamed; a device or a pipe, and
+    a given stream, are written directly. Raises OptionError where the target is one of ``inputs``,
+    even with ``force``, ExistsError where it exists and not ``force``, AccessError where it cannot
+    be written.
     """
     refuse_inputs(target, inputs)
     if hasattr(target, "write"):
@@ -65,7 +65,7 @@ def replacing_file(
 ) -> Iterator[BinaryIO]:
     """As ``replacing``, for an MCZ file: it is read again, strictly, before it gets its name.
 
-    The stream can be read. Also raises FormatError where the new file breaks a rule.
+    The stream can be read. Also raises FormatError if the new file breaks a rule.
     """
     with replacing(target, force=force, inputs=inputs) as stream, rereadable(stream) as own:
         yield own
@@ -76,10 +76,10 @@ def replacing_file(
 
 @contextmanager
 def rereadable(stream: BinaryIO) -> Iterator[BinaryIO]:
-    """``stream`` itself, or, where it cannot be read, a temporary file that is copied to it.
+    """``stream`` itself, or, if it cannot be read, a temporary file that is copied to it.
 
-    So what was written can be read again before it gets its name; it is copied only when the block
-    ends well.
+    So the output can be read again before it gets its name; it is copied only when the block
+    succeeds.
     """
     if all(getattr(stream, name, bool)() for name in ("readable", "seekable", "writable")):
         yield stream
@@ -132,7 +132,7 @@ def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
             umask = os.umask(0)
             os.umask(umask)
             os.chmod(name, 0o666 & ~umask)  # mkstemp made it private
-            if os.name == "posix":  # elsewhere nothing can be renamed that is open
+            if os.name == "posix":  # elsewhere open files cannot be replaced
                 _give_name(name, path, force)
         if os.name != "posix":
             _give_name(name, path, force)
@@ -146,7 +146,7 @@ def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
 
 
 def _locked_file(path: Path, prefix: str) -> tuple[BinaryIO, str]:
-    """A temporary file for ``path`` that no other writer takes for a leftover."""
+    """A temporary file for ``path`` that no other writer treats as a leftover."""
     while True:
         try:
             handle, name = tempfile.mkstemp(prefix=prefix, suffix=SUFFIX, dir=path.parent)
@@ -159,7 +159,7 @@ def _locked_file(path: Path, prefix: str) -> tuple[BinaryIO, str]:
 
 
 def _clear_leftovers(folder: Path, prefix: str) -> None:
-    """Delete temporary files of killed writers: nobody has locked them."""
+    """Delete temporary files of killed writers, which are not locked."""
     with suppress(OSError, ValueError):
         for entry in os.scandir(folder):
             named = entry.name.startswith(prefix) and entry.name.endswith(SUFFIX)
@@ -171,7 +171,7 @@ def _clear_leftovers(folder: Path, prefix: str) -> None:
 
 
 def _give_name(name: str, path: Path, force: bool) -> None:
-    """Rename ``name`` to ``path``; without ``force`` never over what has come there meanwhile."""
+    """Rename ``name`` to ``path``; without ``force`` never over a file that appeared meanwhile."""
     try:
         if not force and _link(name, path):
             os.unlink(name)
@@ -184,7 +184,7 @@ def _give_name(name: str, path: Path, force: bool) -> None:
 
 
 def _link(name: str, path: Path) -> bool:
-    """Make ``path`` a second name of the file; False where the file system has no such names.
+    """Make ``path`` a hard link to the file; False if the file system has none.
 
     Raises FileExistsError, which a rename would not.
     """
@@ -200,7 +200,7 @@ def _link(name: str, path: Path) -> bool:
 
 
 def _sync_directory(path: Path) -> None:
-    """Make the rename itself last; not every system lets a directory be opened."""
+    """Sync the rename itself; not every system opens directories."""
     with suppress(OSError):
         handle = os.open(path, os.O_RDONLY)
         try:
@@ -212,8 +212,8 @@ def _sync_directory(path: Path) -> None:
 def refuse_inputs(target: object, inputs: Iterable[object]) -> None:
     """Raise OptionError where ``target`` is one of ``inputs``, by its file and not by its name.
 
-    Each is a path, an fsspec target, a stream or anything else, which is no file. Links of both
-    sorts lead to the same file; a device, a pipe or what does not exist yet is nobody's input.
+    Each is a path, an fsspec target, a stream or anything else, which is not a file. Links of both
+    sorts lead to the same file; a device, a pipe or a missing file is never an input.
     """
     target_is = _identity(target)
     if target_is is None:
@@ -247,7 +247,7 @@ def _identity(file: object) -> object:
 
 def _stat_of(file: str | bytes | int) -> tuple[int, int] | None:
     try:
-        found = os.stat(file)  # noqa: PTH116 - of a path or a number
+        status = os.stat(file)  # noqa: PTH116 - of a path or a number
     except (OSError, ValueError):  # ValueError: a name with a zero byte
         return None
-    return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
+    return (status.st_dev, status.st_ino) if stat.S_ISREG(status.st_mode) else None

@@ -50,20 +50,20 @@ from mcz.sources import FORMATS
 NO_HASH = bytes(32)
 
 
-# (entries of a quality record as stored, decoded values of each signal) -> its entries
+# (stored entries of a quality record, decoded values of each signal) -> new entries
 Amend = Callable[[dict[str, str], Sequence[Values]], dict[str, str]]
 
 
 @dataclass(frozen=True, slots=True)
 class Decoded:
-    """A signal as a reader has it: of a lossless codec ``values`` are those that were given."""
+    """A signal as a reader has it: of a lossless codec ``values`` are the given ones."""
 
     values: Values
     sha256: bytes
 
 
 class ClipCopy:
-    """CLIP and segments a second time, in memory, where they can be decoded.
+    """A second copy of CLIP and segments, in memory, for decoding.
 
     The file of the clip itself may be a pipe.
     """
@@ -76,18 +76,18 @@ class ClipCopy:
         self.writer.segment(header, streams)
 
     def decoded(self, motion: Motion, coded: Sequence[SignalPlan]) -> list[Decoded]:
-        """The signals; raises ChecksumError where a channel differs that may not."""
+        """The signals; raises ChecksumError if a channel differs that must not."""
         self.writer.end_clip(motion.n_frames, NO_HASH, [NO_HASH] * len(motion.signals))
         directory, data = self.writer.directory, open_source(self._out.getvalue())
         container = Container(data, max_decoded=2**53, directory=directory)
         row = directory.clips[motion.name]
         record = container.clip(row)
-        found = []
+        signals = []
         for index, part in enumerate(coded):
             info = read_signal(container, row, record, index, motion.skeleton, motion.frame_rate)
             info = replace(info, own_codec=part.codec)
-            found.append(_decode(container, info, motion.signals[index], part.lossy_channels()))
-        return found
+            signals.append(_decode(container, info, motion.signals[index], part.lossy_channels()))
+        return signals
 
 
 def _decode(
@@ -113,18 +113,18 @@ def _decode(
     return Decoded(values, digest.digest())
 
 
-def _is_same(given: Values, found: Values) -> bool:
-    """True where the bits are the same, those of NaN apart."""
-    own, other = (np.ascontiguousarray(values).view(np.int64) for values in (given, found))
-    if given.dtype == found.dtype and np.array_equal(own, other):
+def _is_same(given: Values, decoded: Values) -> bool:
+    """True for equal bits, except those of NaN."""
+    own, other = (np.ascontiguousarray(values).view(np.int64) for values in (given, decoded))
+    if given.dtype == decoded.dtype and np.array_equal(own, other):
         return True
-    return canonical(given) == canonical(found)
+    return canonical(given) == canonical(decoded)
 
 
-def _is_same_mask(given: NDArray[np.bool_] | None, found: NDArray[np.bool_] | None) -> bool:
-    if given is None or found is None:
-        return (given is None or bool(given.all())) and (found is None or bool(found.all()))
-    return np.array_equal(given, found)
+def _is_same_mask(given: NDArray[np.bool_] | None, decoded: NDArray[np.bool_] | None) -> bool:
+    if given is None or decoded is None:
+        return (given is None or bool(given.all())) and (decoded is None or bool(decoded.all()))
+    return np.array_equal(given, decoded)
 
 
 def check_values(stream: BinaryIO, names: Iterable[str]) -> None:
@@ -154,7 +154,7 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
     given = skeleton
     if writer.last_skeleton is not None and writer.last_skeleton[0] is given:
         id_ = writer.last_skeleton[1]
-        if (ChunkType.SKEL, id_) in writer.directory.shared:  # not taken back with what failed
+        if (ChunkType.SKEL, id_) in writer.directory.shared:  # not undone after a failure
             return id_
     check("joints", skeleton.n_joints, writer.profile.joints)
     check("channels", skeleton.n_channels, writer.profile.channels)
@@ -178,7 +178,7 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
 def write_clip(
     writer: Writer, motion: Motion, codec: Codec, params: Params
 ) -> dict[str, str] | None:
-    """``write_plan`` of a motion as it is."""
+    """``write_plan`` of a motion without targets."""
     return write_plan(writer, plan_clip(Prepared(motion), codec, params, writer.profile))
 
 
@@ -203,8 +203,8 @@ def write_plan(
 ) -> dict[str, str] | None:
     """Write one clip: its skeletons and template if new, CLIP, segments, CEND, quality if lossy.
 
-    Returns what the quality record says, None where there is none. ``remarks`` join it, ``amend``
-    has the last word on it. ``copy`` decodes the clip before it ends.
+    Returns the quality record, None if there is none. ``remarks`` are added to it, ``amend`` edits
+    it last. ``copy`` decodes the clip before it ends.
     """
     motion, codec = plan.motion, plan.codec
     record = _write_references(writer, plan)
@@ -229,9 +229,9 @@ def write_plan(
 
 
 def begin_open_clip(writer: Writer, plan: ClipPlan, first_number: int = 1) -> None:
-    """Write the CLIP, and what it refers to, of a plan of which no frame is known yet.
+    """Write the CLIP of a plan without known frames, and the chunks that it refers to.
 
-    ``first_number`` is that of its first frame.
+    ``first_number`` is the number of its first frame.
     """
     record = _write_references(writer, plan)
     record.flags |= payloads.OPEN_CLIP
@@ -240,7 +240,7 @@ def begin_open_clip(writer: Writer, plan: ClipPlan, first_number: int = 1) -> No
 
 
 def _write_references(writer: Writer, plan: ClipPlan) -> payloads.Clip:
-    """Write what CLIP refers to; return its record."""
+    """Write the chunks that CLIP refers to; return its record."""
     prepared, source = plan.prepared, plan.motion.source
     for model in plan.models:
         writer.shared(ChunkType.MODL, model)
@@ -270,7 +270,7 @@ def _write_signal(
 def _segment(
     profile: Profile, motion: Motion, index: int, source: MemorySource, segment: Segment
 ) -> tuple[SegmentHeader, list[bytes]]:
-    """Header and streams of a segment: its notes, its masks, and what the codec made."""
+    """Header and streams of a segment: its notes, its masks, and the codec's streams."""
     start, stop = segment.first, segment.first + segment.n_frames
     per_frame = 8 * source.layout.samples_per_frame * max(1, source.layout.n_channels)
     size = segment.n_frames * per_frame

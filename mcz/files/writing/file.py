@@ -1,7 +1,7 @@
 """``mcz.write``, ``mcz.encode`` and ``mcz.to_npz``: one motion, or one source file, to a new file.
 
-A motion on its way: ``prepare`` gives it the domain of its codec, ``tuning`` finds the parameters
-that meet a target, ``planning`` decides which chunks a clip is, ``clip_writer`` writes them.
+The path of a motion: ``prepare`` converts it for its codec, ``tuning`` finds the parameters that
+meet a target, ``planning`` decides on the chunks of a clip, ``clip_writer`` writes them.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from mcz.files.writing.tuning import write_motion
 from mcz.files.writing.write_transaction import WriteTransaction, check_metadata
 from mcz.model.motion import Motion
 from mcz.model.text_format import brief
-from mcz.model.threads import limited
+from mcz.model.threads import limit_threads
 from mcz.model.types import Params, Progress, Target
 from mcz.sources import is_table
 
-SHORT = 65536  # bytes of a source file whose skeleton and texts are a large part of what is written
+SHORT = 65536  # bytes of a source file whose skeleton and texts dominate the output
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +51,9 @@ class WrittenClip:
 class Written:
     """The result of ``write`` and ``encode``.
 
-    ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal. ``notes``: what
-    is odd about the source file. ``source_bytes``: what the file gives back, of ``encode`` the
-    source and the ASF that it was read with; 0 where there is no source. ``inputs``: of ``encode``
-    these files.
+    ``decoded_bytes``: the least ``max_decoded`` for reading every signal. ``notes``: odd facts of
+    the source file. ``source_bytes``: size of the restored files, of ``encode`` the source and its
+    ASF; 0 without a source. ``inputs``: of ``encode`` these files.
     """
 
     size: int
@@ -114,23 +113,23 @@ def write(
     """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
 
     ``effort`` names a lossless codec in place of ``codec``: "fast", the default, is read fastest,
-    "best" is smallest. ``params`` are the codec's; ``profile`` is
-    "base", "large", which allows more, or "small", which embedded readers decode. ``copies``: what
-    holds the clip together, skeleton and template among it, stands in the file a second time, so
-    that a flipped bit there costs no frame (``mcz.open`` with ``salvage``). ``threads`` may code at
-    once, by default one a processor; the bytes are the same. Raises OptionError, MotionError, or
-    LimitError where the profile is too small; MotionError also for a key of the metadata that
-    SPEC.md does not register, unless it is private (``x-...``).
+    "best" is smallest. ``params`` are the codec's; ``profile`` is "base", "large", which allows
+    more, or "small", for embedded readers. ``copies``: chunks that the clip depends on, such as
+    skeleton and template, are stored a second time, so that a flipped bit there costs no frame
+    (``mcz.open`` with ``salvage``). ``threads`` encode in parallel, by default one a processor; the
+    bytes are the same. Raises OptionError, MotionError, or LimitError where the profile is too
+    small; MotionError also for a key of the metadata that SPEC.md does not register, unless it is
+    private (``x-...``).
     """
     if not isinstance(motion, Motion):
         raise OptionError(f"a motion is written to a target, not {type(motion).__name__}")
     check_metadata(motion.metadata, motion.name)
-    found = encoding_options(codec, effort, params).found
-    motion = with_true_sources(motion, lossless=found.lossless)
-    prepared = prepare(motion, found, params, (under_its_path(motion.skeleton),))
-    with limited(threads), replacing(target, force=force, inputs=params.values()) as stream:
+    codec_options = encoding_options(codec, effort, params).selected_codec
+    motion = with_true_sources(motion, lossless=codec_options.lossless)
+    prepared = prepare(motion, codec_options, params, (under_its_path(motion.skeleton),))
+    with limit_threads(threads), replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_named(profile), copies=copies)
-        quality = write_motion(writer, prepared, found, params, progress)
+        quality = write_motion(writer, prepared, codec_options, params, progress)
         writer.finish()
     return summarize(writer.directory, writer.offset, quality)
 
@@ -155,19 +154,19 @@ def encode(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Written:
-    """Turn one source file into an MCZ file.
+    """Encode one source file as an MCZ file.
 
-    ``skeleton`` is the ASF of an AMC, as ``mcz.read`` takes it, with the same SkeletonWarning.
+    ``skeleton`` is the ASF of an AMC, as in ``mcz.read``, with the same SkeletonWarning.
     ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
-    up ("x" to "-z"). ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``, ``copies``
-    and ``threads`` are those of ``mcz.write``. Raises SourceError, OptionError, MotionError or
-    LimitError; nothing is left under the final name then. A target that is the source or its
-    skeleton is refused, even with ``force``.
+    up ("x" to "-z"). ``arrays`` and ``model`` are as in ``mcz.read``; ``effort``, ``copies`` and
+    ``threads`` as in ``mcz.write``. Raises SourceError, OptionError, MotionError or LimitError;
+    nothing is left under the final name then. A target that is the source or its skeleton is
+    refused, even with ``force``.
     """
     path = Path(source)
     if up is not None and path.suffix.lower() == ".asf":
         raise OptionError(
-            "a skeleton alone is kept as it is; say the up axis of its AMC", path=path
+            "a skeleton alone is kept unchanged; give the up axis with its AMC", path=path
         )
     options = SourceOptions(
         skeleton=skeleton,
@@ -181,7 +180,7 @@ def encode(
     )
     entry = SourceEncoder(path, path.name, options, encoding_options(codec, effort, params))
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
-    with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
+    with limit_threads(threads), replacing(target, force=force, inputs=inputs) as stream:
         short = is_table(path) or (path.exists() and path.stat().st_size <= SHORT)
         transaction = WriteTransaction(
             stream, profile_named(profile), hold=verbatim, copies=copies, short=short
@@ -192,14 +191,14 @@ def encode(
     if entry.remark:
         warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
     directory, size = transaction.writer.directory, transaction.writer.offset
-    found = summarize(directory, size, entry.quality, entry.notes, entry.source_bytes)
-    return replace(found, inputs=tuple(map(str, entry.inputs)))
+    written = summarize(directory, size, entry.quality, entry.notes, entry.source_bytes)
+    return replace(written, inputs=tuple(map(str, entry.inputs)))
 
 
 def to_npz(motion: Motion, target: Target, *, force: bool = False) -> None:
     """Write channels, skeleton, rotations and positions of ``motion`` as an NPZ without pickles.
 
-    docs/guides/tables.md lists the arrays; "about" in the file describes how they hang together.
+    docs/guides/tables.md lists the arrays; "about" in the file describes their relations.
     ``target`` is a path, an fsspec target or a binary stream. Raises ExistsError where it exists
     and not ``force``, and AccessError.
     """

@@ -1,4 +1,4 @@
-"""The plan of a clip: a motion made ready for its codec, and what is decided before the writing."""
+"""The plan of a clip: a motion prepared for its codec, and decisions before writing."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from mcz.model.types import JsonObject, Params
 from mcz.model.units import axes_of
 from mcz.sources import FORMATS
 
-BESIDE = "fast"  # the codec of all signals but the motion, where that one is lossy
+FURTHER_CODEC = "fast"  # of all signals other than the motion, if its codec is lossy
 
 
 @dataclass(frozen=True, slots=True)
 class StoredSkeleton:
     """A skeleton that a file stores.
 
-    Where it ``derives``, its base is the one before it. ``path`` names its own file, which the MCZ
+    If it ``derives``, its base is the one before it. ``path`` names its own file, which the MCZ
     file restores; empty: it restores none.
     """
 
@@ -49,7 +49,7 @@ class StoredSkeleton:
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A motion as a codec takes it, and the skeletons that are stored: its own alone, or last."""
+    """A motion in the form of its codec, and the stored skeletons, its own last."""
 
     motion: Motion
     skeletons: tuple[StoredSkeleton, ...] = ()
@@ -58,10 +58,10 @@ class Prepared:
 def prepare(
     motion: Motion, codec: Codec, params: Params, skeletons: tuple[StoredSkeleton, ...] = ()
 ) -> Prepared:
-    """``motion``, or the positions of its points where ``codec`` codes those.
+    """``motion``, or the positions of its points if ``codec`` codes those.
 
-    ``skeletons`` are those of ``Prepared``, of the motion as it is given. Raises OptionError where
-    positions have no meaning, MotionError where there are none.
+    ``skeletons`` are those of ``Prepared``, of the given motion. Raises OptionError where positions
+    have no meaning, MotionError where there are none.
     """
     options = codec.options(of_codec(params))
     skeletons = skeletons or (StoredSkeleton(motion.skeleton),)
@@ -75,7 +75,7 @@ def prepare(
 
 
 def stored_with_base(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[StoredSkeleton, ...]:
-    """The stored skeletons of one that was read with ``base``, whose file stays as it is."""
+    """The stored skeletons of one that was read with ``base``, whose file is unchanged."""
     if base is None:
         return (StoredSkeleton(skeleton),)
     derives = skeleton.base is not None or axes_of(skeleton) != axes_of(base.skeleton)
@@ -83,22 +83,22 @@ def stored_with_base(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[S
 
 
 def under_its_path(skeleton: Skeleton) -> StoredSkeleton:
-    """``skeleton``, stored with the path of its own file where it has one."""
+    """``skeleton``, stored with the path of its own file if it has one."""
     path = skeleton.source.path if skeleton.source is not None else ""
     return StoredSkeleton(skeleton, path=path)
 
 
 def wants_positions(codec: Codec, options: Params, skeleton: Skeleton) -> bool:
-    """True where a codec takes the positions of points instead of the channels of a clip."""
+    """True if a codec takes the positions of points instead of the channels of a clip."""
     if not codec.positions or options.get("domain") == "channels" or not skeleton.joints:
         return False
     return point_set(skeleton) != "markers"
 
 
 def check_bones(skeleton: Skeleton, what: str) -> None:
-    """Raise OptionError where rotations move no point, since no bone has a length.
+    """Raise OptionError if rotations move no point, since no bone has a length.
 
-    Arrays of body models are such: ``what`` would then be about the root alone.
+    Arrays of body models are such: ``what`` would then depend on the root alone.
     """
     if has_no_lengths(skeleton):
         raise OptionError(
@@ -108,11 +108,11 @@ def check_bones(skeleton: Skeleton, what: str) -> None:
 
 
 def with_true_sources(motion: Motion, *, lossless: bool) -> Motion:
-    """``motion`` whose sources state the size and the hash of what it restores.
+    """``motion`` whose sources state the size and the hash of the file that they restore.
 
-    Values may have been replaced since they were read: then the source is of no known file. A
-    skeleton that is no longer that of its own file has none. Raises MotionError or FormatError
-    where the source cannot hold the values.
+    Values may have been replaced since they were read: then the source has no original file. A
+    skeleton that differs from its own file has none. Raises MotionError or FormatError where the
+    source cannot hold the values.
     """
     motion = replace(motion, skeleton=_with_true_source(motion.skeleton)).counted_by_ones()
     source = motion.source
@@ -131,14 +131,14 @@ def _with_true_source(skeleton: Skeleton) -> Skeleton:
         return skeleton
     try:
         data = FORMATS["asf"].write(skeleton) if source.format == "asf" else b""
-    except MotionError:  # printed anew, and the format cannot say it
+    except MotionError:  # printed again, and the format cannot hold it
         data = b""
     known = (source.size, source.sha256) == _facts(data)
     return skeleton if data == source.template and known else replace(skeleton, source=None)
 
 
 def with_source_hash(motion: Motion, *, lossless: bool) -> Motion:
-    """``motion`` with size and hash of its source file, which was changed or cut since.
+    """``motion`` with size and hash of its changed or cut source file.
 
     Unless ``lossless``, its values may lie off their grids.
     """
@@ -173,7 +173,7 @@ def _facts(data: bytes) -> tuple[int, bytes]:
 
 @dataclass(frozen=True, slots=True)
 class SignalPlan:
-    """A signal, the codec that it is encoded with, and the segments that are yet to be encoded."""
+    """A signal, its codec, and the segments that are yet to be encoded."""
 
     source: MemorySource
     codec: Codec
@@ -190,7 +190,7 @@ class SignalPlan:
 
 @dataclass(frozen=True, slots=True)
 class ClipPlan:
-    """A clip as it is stored, in the order of its chunks.
+    """A clip in stored form, in the order of its chunks.
 
     ``prepared`` has the values that a file stores; ``models`` are payloads of MODL. ``options`` are
     those of the motion's codec.
@@ -211,11 +211,11 @@ class ClipPlan:
 
 
 def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> ClipPlan:
-    """The plan of a motion, whose codec is ``codec``, for a file of a profile.
+    """The plan of a motion with the codec ``codec``, for a file of a profile.
 
-    A lossy codec takes the motion alone; further signals stay lossless. Raises OptionError for a
-    bad parameter or a target that nobody has met yet (see ``tuning.py``), MotionError for values
-    that the codec cannot hold, LimitError for what the profile does not allow.
+    A lossy codec takes only the motion; further signals stay lossless. Raises OptionError for a bad
+    parameter or a target that is not met yet (see ``tuning.py``), MotionError for values that the
+    codec cannot hold, LimitError for a clip beyond the profile.
     """
     options = codec.options(params, inner=True)
     if codec.dial and find_targets(options) and options[codec.dial.parameter] is None:
@@ -236,7 +236,7 @@ def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile
 def plan_open_clip(
     prepared: Prepared, codec: Codec, options: Params, encoded: Encoded, profile: Profile
 ) -> ClipPlan:
-    """The plan of a clip of which no frame is known yet."""
+    """The plan of a clip without known frames."""
     check("channels", prepared.motion.signals[0].n_channels, profile.channels)
     source = MemorySource(prepared.motion, 0, codec, profile.segment_bytes)
     models = tuple(_model_payloads(encoded, profile))
@@ -251,7 +251,7 @@ def _signal_plan(
     motion: Motion, index: int, codec: Codec, options: Params, profile: Profile
 ) -> SignalPlan:
     if index and not codec.lossless:
-        codec = codec_by_name(BESIDE)
+        codec = codec_by_name(FURTHER_CODEC)
         options = codec.options({})
     signal = motion.signals[index]
     if not codec.lossless and signal.channels is not None:
@@ -267,7 +267,7 @@ def _signal_plan(
 
 
 def _model_payloads(encoded: Encoded, profile: Profile) -> Iterator[bytes]:
-    """Models that a signal needs; well-known ones where all shall be in the file."""
+    """Models that a signal needs, with well-known ones if all shall be in the file."""
     known = encoded.known if profile is LARGE else ()
     for model in (*encoded.models, *known):
         yield build(payloads.Modl(kind=model.kind, data=model.data), "MODL")

@@ -1,7 +1,7 @@
-"""The quality record: what a lossy codec changed, and how it was asked to.
+"""The quality record: the errors of a lossy codec, and its settings.
 
-SPEC.md, "QUAL", is normative; docs/reference/measures.md defines the figures.
-``RunningFigures`` are those of a live clip.
+SPEC.md, "QUAL", is normative; docs/reference/measures.md defines the figures. ``RunningFigures``
+are those of a live clip.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
@@ -20,10 +19,10 @@ from mcz.kinematics.metrics import compare
 from mcz.kinematics.metrics.sums import channel_errors
 from mcz.model.motion import Exceptions, Motion, Signal, Skeleton
 from mcz.model.schema import build
-from mcz.model.types import JsonObject, Params, Settings, Values
+from mcz.model.types import Floats, JsonObject, Params, Settings, Values
 
 CHUNK = ChunkType.QUAL
-# What a record does without, for its bytes: the radius is 3 cm where it is not stated.
+# Figures that a record omits to save bytes: the radius is 3 cm unless stated.
 NOT_STORED = ("max_channel_error", "max_channel_error_frame", "max_channel_error_channel")
 LEFT_OUT = (
     *("shell_radius_cm", "shell_max_frame", "shell_max_joint"),
@@ -41,8 +40,8 @@ def quality_record(
 ) -> dict[str, str]:
     """The entries of the record; ``decoded`` are the values of every signal as a reader has them.
 
-    Where no point has a place, the entries ``NOT_STORED``, which are no metrics of the format, say
-    what the greatest error of a channel is.
+    If no point has a position, the entries ``NOT_STORED``, which are not metrics of the format,
+    have the greatest error of a channel.
     """
     signals = tuple(map(with_values, original.signals, decoded))
     entries = quality_entries(original, replace(original, signals=signals), codec_name, options)
@@ -52,11 +51,11 @@ def quality_record(
 
 
 def _greatest_error(original: Motion, decoded: Signal) -> JsonObject:
-    """The greatest error of a channel, less whole turns, and its frame and channel."""
+    """The greatest error of a channel, without whole turns, and its frame and channel."""
     skeleton, signal = original.skeleton, original.signals[0]
-    given, found = (np.asarray(one.masked(), np.float64) for one in (signal, decoded))
-    with np.errstate(all="ignore"):  # what overflows is no figure
-        errors = channel_errors(skeleton, signal, given, found)
+    given, decoded_values = (np.asarray(one.masked(), np.float64) for one in (signal, decoded))
+    with np.errstate(all="ignore"):  # overflow is no figure
+        errors = channel_errors(skeleton, signal, given, decoded_values)
     errors[~np.isfinite(errors)] = -1.0
     if not errors.size or errors.max() < 0:
         return {}
@@ -76,7 +75,7 @@ def quality_payload(entries: Mapping[str, str]) -> bytes:
 def quality_entries(
     original: Motion, decoded: Motion, codec_name: str, options: Params
 ) -> dict[str, str]:
-    """Settings, then figures, as text; what there is no figure of is left out.
+    """Settings, then figures, as text; None is left out.
 
     Numbers are the shortest decimals that read back as the same binary64.
     """
@@ -87,8 +86,8 @@ def quality_entries(
 def figures(original: Motion, decoded: Motion) -> JsonObject:
     """The figures of a record by their metric ids, rounded; None where there is none."""
     contacts = bool(find_feet(original.skeleton))
-    found = compare(original, decoded, contacts=contacts).entries()
-    return {key: _rounded(value) for key, value in found.items() if key not in LEFT_OUT}
+    entries = compare(original, decoded, contacts=contacts).entries()
+    return {key: _rounded(value) for key, value in entries.items() if key not in LEFT_OUT}
 
 
 def _rounded(value: object) -> object:
@@ -127,9 +126,6 @@ def _text(value: object) -> str:
     return str(value)
 
 
-Floats = NDArray[np.float64]
-
-
 class RunningFigures:
     """The errors of a quality record, frame by frame: of values and, of markers, of positions."""
 
@@ -143,7 +139,7 @@ class RunningFigures:
 
     def add(self, given: Floats, decoded: Floats) -> None:
         """Add a frame; NaN in ``given`` does not count."""
-        with np.errstate(all="ignore"):  # what overflows is no figure
+        with np.errstate(all="ignore"):  # overflow is no figure
             squares = np.square(decoded - given)
             self._squares, self._values = _add_valid(self._squares, self._values, squares)
             if self._positions:
@@ -158,11 +154,11 @@ class RunningFigures:
     def entries(self) -> Settings:
         """The figures by their metric ids, None where there is none."""
         unit = self.skeleton.unit_cm
-        found: Settings = {"frames": self._frames, "channels": self.skeleton.n_channels}
-        found["mse_raw"] = self._squares / self._values if self._values else None
+        figures: Settings = {"frames": self._frames, "channels": self.skeleton.n_channels}
+        figures["mse_raw"] = self._squares / self._values if self._values else None
         if self._positions and self._where is not None:
             mean, (frame, point) = self._sum / self._points, self._where
-            found |= {
+            figures |= {
                 "point_set": point_set(self.skeleton),
                 "points": self.skeleton.n_joints,
                 "unit_cm": unit,
@@ -173,13 +169,13 @@ class RunningFigures:
                 "max_position_error_frame": frame,
                 "max_position_error_point": point_names(self.skeleton)[point],
             }
-        return {k: v for k, v in found.items() if not isinstance(v, float) or np.isfinite(v)}
+        return {k: v for k, v in figures.items() if not isinstance(v, float) or np.isfinite(v)}
 
 
 def _add_valid(total: float, count: int, more: Floats) -> tuple[float, int]:
-    """Sum and number with those of ``more`` that are not NaN."""
-    found = float(more.sum())
-    if found == found:
-        return total + found, count + more.size
+    """Add the values of ``more`` that are not NaN to a sum and a count."""
+    added = float(more.sum())
+    if added == added:
+        return total + added, count + more.size
     valid = ~np.isnan(more)
     return total + float(more[valid].sum()), count + int(np.count_nonzero(valid))

@@ -1,8 +1,8 @@
-"""Bounds of the signals beside the motion: coarser numbers, whose errors are measured.
+"""Bounds of the signals other than the motion: coarser numbers, whose errors are measured.
 
-``analog.max_error=0.5mV`` or ``1N,10Nmm`` asks for one. Each channel is put on a coarser number
-grid, or on fewer numbers of its own grid where its source can be written from that grid alone.
-Codec ``fast`` then codes it exactly, so that a decoder needs nothing new.
+``analog.max_error=0.5mV`` or ``1N,10Nmm`` requests one. Each channel is put on a coarser number
+grid, or on fewer numbers of its own grid if its source can be written only from that grid. Codec
+``fast`` then codes it exactly, so that decoders need no change.
 """
 
 from __future__ import annotations
@@ -22,19 +22,16 @@ from mcz.kinematics.metrics.comparison import named_signals, signal_errors
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal, Skeleton, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
-from mcz.model.types import JsonObject, Params
+from mcz.model.types import Bools, Floats, JsonObject, Params
 from mcz.model.units import unit_ratio
 from mcz.sources import recording_of, with_analog_scales
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 EXACT_ROLES = {"times": "they order the frames", "residuals": "they say which points are valid"}
 FLOATS = (GridKind.BINARY32, GridKind.VAX_F)
 MOST_MULTIPLES = 2**19  # of a step in a number; beyond, fast may find no unit
 SHORT_BITS = 8  # of a unit of floats, few of whose multiples are rounded then
 TRIALS = 10
-NEAR = 0.97  # of a mean error that was asked for: near enough
+GOOD_ENOUGH = 0.97  # of a requested mean error: near enough
 
 
 def of_codec(params: Params) -> JsonObject:
@@ -50,7 +47,7 @@ def _is_bound(key: str) -> bool:
 def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, dict[str, str]]:
     """``motion`` with coarser signals as the bounds among ``params`` allow.
 
-    Also returns what the quality record says. Raises OptionError for a bound that makes no sense.
+    Also returns entries of the quality record. Raises OptionError for a bad bound.
     """
     asked = {key: value for key, value in params.items() if _is_bound(key)}
     if asked and codec.lossless:
@@ -62,7 +59,7 @@ def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, d
     remarks: dict[str, str] = {}
     for name in dict.fromkeys(key.rpartition(".")[0] for key in asked):
         if name not in numbers:
-            raise OptionError(f"no signal {name!r} beside the motion; there are {[*numbers]}")
+            raise OptionError(f"no signal {name!r} other than the motion; there are {[*numbers]}")
         given = signals[numbers[name]]
         if given.role in EXACT_ROLES:
             raise OptionError(f"signal {name!r} stays exact: {EXACT_ROLES[given.role]}")
@@ -70,9 +67,9 @@ def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, d
             _limits(motion.skeleton, given, f"{name}.{error}", asked)
             for error in (MAX_ERROR, MEAN_ERROR)
         ]
-        motion, found = _coarsen(motion, given, *limits)
-        signals[numbers[name]] = found
-        errors = signal_errors(motion.skeleton, given, found)
+        motion, coarse = _coarsen(motion, given, *limits)
+        signals[numbers[name]] = coarse
+        errors = signal_errors(motion.skeleton, given, coarse)
         figures = {"mse": errors.mse, MAX_ERROR: errors.greatest, MEAN_ERROR: errors.mean}
         known = {k: v for k, v in figures.items() if v is not None}
         remarks |= {f"signal.{name}.{key}": repr(value) for key, value in known.items()}
@@ -81,7 +78,7 @@ def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, d
 
 
 def _limits(skeleton: Skeleton, signal: Signal, key: str, asked: Params) -> Floats:
-    """The bound of each channel in its own unit, (n_channels,); infinite where none is asked."""
+    """The bound of each channel in its own unit, (n_channels,); infinite without one."""
     channels = skeleton.channels if signal.channels is None else signal.channels
     if key not in asked:
         return np.full(len(channels), math.inf)
@@ -90,9 +87,9 @@ def _limits(skeleton: Skeleton, signal: Signal, key: str, asked: Params) -> Floa
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A channel: values in its unit, the numbers that a file stores, and what these mean.
+    """A channel: values in its unit, stored numbers, and their scaling.
 
-    ``value = (number - offset) * scale * general``. ``kept``: values that stay as they are.
+    ``value = (number - offset) * scale * general``. ``kept``: values that stay unchanged.
     """
 
     values: Floats
@@ -104,15 +101,15 @@ class Column:
     scale: float = 1.0
     general: float = 1.0
 
-    def meant(self, numbers: Floats) -> Floats:
+    def values_of(self, numbers: Floats) -> Floats:
         return (numbers - self.offset) * self.scale * self.general
 
     def on(self, grid: Grid, numbers: Floats) -> Column | None:
-        """The column with other numbers, those that stay among them; None where it cannot be."""
+        """The column with other numbers, except kept ones; None if that is impossible."""
         numbers = np.where(self.kept, self.numbers, numbers + 0.0)  # no -0
         with np.errstate(all="ignore"):
-            found = replace(self, grid=grid, numbers=numbers, values=self.meant(numbers))
-        return found if self.kept.any() <= _can_hold(self.grid, grid) else None
+            column = replace(self, grid=grid, numbers=numbers, values=self.values_of(numbers))
+        return column if self.kept.any() <= _can_hold(self.grid, grid) else None
 
     def size(self) -> int:
         return channel_bytes(self.grid.ordinals(self.numbers)[0], self.grid)
@@ -129,28 +126,28 @@ def _coarsen(
     given = list(_columns(signal))
     of_c3d = recording_of(motion.source) is not None
     rescales = of_c3d and signal.role == "analog" and _states_scales(motion.source, given)
-    found = [
+    columns = [
         _coarsen_column(
             column, most, average, SourceRules(motion.source is not None, of_c3d, rescales)
         )
         for column, most, average in zip(given, greatest.tolist(), mean.tolist(), strict=True)
     ]
-    scales = {c: new.scale for c, new in enumerate(found) if new.scale != given[c].scale}
+    scales = {c: new.scale for c, new in enumerate(columns) if new.scale != given[c].scale}
     if scales:
         assert motion.source is not None
         motion = replace(motion, source=with_analog_scales(motion.source, scales))
         signal = replace(signal, scaling=recording_of(motion.source).scaling, stored=signal.stored)
-    changed = [c for c, new in enumerate(found) if new is not given[c]]
+    changed = [c for c, new in enumerate(columns) if new is not given[c]]
     if not changed:
         return motion, signal
-    grids = tuple(column.grid for column in found)
+    grids = tuple(column.grid for column in columns)
     numbers = signal.stored.copy()
     if any(grid.kind != GridKind.INTEGER for grid in grids):
         numbers = numbers.astype(np.float64)
     ordinals = None if signal.ordinals is None else signal.ordinals.copy()
     for c in changed:
-        numbers[:, c] = found[c].numbers
-        if ordinals is not None:  # those that are known of NaNs
+        numbers[:, c] = columns[c].numbers
+        if ordinals is not None:  # also known for NaNs
             same = given[c].kept & (grids[c] == given[c].grid)
             ordinals[:, c] = np.where(same, ordinals[:, c], 0)
     signal = replace(
@@ -165,7 +162,6 @@ def _coarsen(
 
 
 def _states_scales(source: Source | None, columns: Sequence[Column]) -> bool:
-    """True where the source says of each channel of a converter what its words mean."""
     scales = {c: column.scale for c, column in enumerate(columns)}
     return source is not None and with_analog_scales(source, scales) is not None
 
@@ -199,19 +195,19 @@ class SourceRules:
 
 
 def _coarsen_column(column: Column, greatest: float, mean: float, rules: SourceRules) -> Column:
-    """The column on the coarsest numbers within the bounds, or as it is where none is smaller."""
+    """The column on the coarsest numbers within the bounds, unchanged if none is smaller."""
     unit = abs(column.scale * column.general)
     most = 2 * greatest
     step, best, least = min(most, 4 * mean), column, 0.0
     for _ in range(TRIALS):
         if not 0 < step < math.inf or not 0 < unit < math.inf or column.kept.all():
             break
-        found = _round_column(column, step, unit, rules)
-        reached = math.inf if found is None else _mean_error(column, found, greatest)
-        if found is not None and reached < math.inf and reached <= mean * (1 - 1e-9):
+        rounded = _round_column(column, step, unit, rules)
+        reached = math.inf if rounded is None else _mean_error(column, rounded, greatest)
+        if rounded is not None and reached < math.inf and reached <= mean * (1 - 1e-9):
             if reached >= least:
-                best, least = found, reached
-            if step >= most or reached >= NEAR * mean:
+                best, least = rounded, reached
+            if step >= most or reached >= GOOD_ENOUGH * mean:
                 break
             step = min(most, step * min(2.0, 0.99 * mean / max(reached, mean / 2)))
         else:
@@ -219,28 +215,28 @@ def _coarsen_column(column: Column, greatest: float, mean: float, rules: SourceR
     return best if best is not column and best.size() < column.size() else column
 
 
-def _mean_error(column: Column, found: Column, greatest: float) -> float:
-    """The mean error of ``found``; infinite where one is beyond ``greatest``."""
-    if not is_within(column.values, found.values, greatest)[~column.kept].all():
+def _mean_error(column: Column, rounded: Column, greatest: float) -> float:
+    """The mean error of ``rounded``; infinite where one is beyond ``greatest``."""
+    if not is_within(column.values, rounded.values, greatest)[~column.kept].all():
         return math.inf
-    errors = np.abs(column.values[column.valid] - found.values[column.valid])
+    errors = np.abs(column.values[column.valid] - rounded.values[column.valid])
     return float(errors.mean()) if len(errors) else 0.0
 
 
-def is_within(given: Floats, found: Floats, bound: float) -> Bools:
-    """True where |given - found| <= bound, without any rounding."""
+def is_within(given: Floats, rounded: Floats, bound: float) -> Bools:
+    """True where |given - rounded| <= bound, without any rounding."""
     if bound == math.inf:
-        return np.isfinite(found)
+        return np.isfinite(rounded)
     with np.errstate(all="ignore"):
-        error = given - found
+        error = given - rounded
         back = error - given
-        rest = (given - (error - back)) - (found + back)  # of the subtraction
+        rest = (given - (error - back)) - (rounded + back)  # of the subtraction
         at_bound = (np.abs(error) == bound) & (rest * np.sign(error) <= 0)
         return np.asarray((np.abs(error) < bound) | at_bound)
 
 
 def _round_column(column: Column, step: float, unit: float, rules: SourceRules) -> Column | None:
-    """The column on numbers ``step`` apart, in its unit; None where there are none such."""
+    """The column on numbers ``step`` apart, in its unit; None if there are none."""
     kind, numbers, own = column.grid.kind, column.numbers, step / unit
     with np.errstate(all="ignore"):
         if kind in FLOATS:
@@ -278,8 +274,8 @@ def _rescale(column: Column, step: float) -> Column | None:
     if step < 2 or not math.isfinite(scale):
         return None
     words = np.rint((column.numbers - column.offset) * (column.scale / scale)) + column.offset
-    found = replace(column, scale=scale)
-    return replace(found, numbers=words, values=found.meant(words))
+    rescaled = replace(column, scale=scale)
+    return replace(rescaled, numbers=words, values=rescaled.values_of(words))
 
 
 MAX_ERROR, MEAN_ERROR = "max_error", "mean_error"
@@ -311,7 +307,7 @@ def limits_of(
     Raises OptionError for a channel that none fits.
     """
     bounds = [parse_bound(key, one) for one in str(text).split(",")]
-    found = []
+    limits = []
     for number, channel in enumerate(channels):
         ratios = [(size, _ratio(skeleton, channel, unit) if unit else 1.0) for size, unit in bounds]
         fitting = [size * ratio for size, ratio in ratios if ratio is not None]
@@ -322,8 +318,8 @@ def limits_of(
                 f"{key}: channel {channel.label or number} is in {own or 'no unit that is known'}, "
                 f"which {units} does not fit; several bounds may be given, such as 1N,10Nmm,5"
             )
-        found.append(fitting[0])
-    return np.array(found)
+        limits.append(fitting[0])
+    return np.array(limits)
 
 
 def _unit_of(skeleton: Skeleton, channel: Channel) -> str:
@@ -335,7 +331,7 @@ def _unit_of(skeleton: Skeleton, channel: Channel) -> str:
 
 
 def _ratio(skeleton: Skeleton, channel: Channel, unit: str) -> float | None:
-    """The size of ``unit`` in that of the channel; None where it does not fit."""
+    """The size of ``unit`` in that of the channel; None if it does not fit."""
     if channel.kind not in LENGTHS:
         return unit_ratio(unit, _unit_of(skeleton, channel))
     ratio = unit_ratio(unit, "cm")

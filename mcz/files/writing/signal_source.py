@@ -1,7 +1,7 @@
-"""A signal in memory, as a codec reads it, and what is said of it beside the codec's streams.
+"""A signal in memory, as a codec reads it, and its notes and masks.
 
-One block of frames is worked on at a time, so that encoding needs memory for a segment beside the
-values themselves.
+One block of frames is processed at a time, so that encoding needs memory for a segment in addition
+to the values themselves.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from mcz.model.types import Params
 from mcz.sources import recording_of
 
 KEPT_BLOCKS = 8
-MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
+MAX_INTEGER = 2**53  # greatest integer up to which a binary64 holds all exactly
 Block = tuple[NDArray[np.int64], Signal]
 
 
 class MemorySource:
     """The SignalSource of one signal of a motion.
 
-    Values that lie on no point of their text grid join the exceptions, so that nothing is lost.
+    Values off their text grid become exceptions, so that nothing is lost.
     """
 
     def __init__(
@@ -43,16 +43,16 @@ class MemorySource:
         segment_bytes: int,
         options: Params = MappingProxyType({}),
     ) -> None:
-        """``options``: all of the codec's, where it has groups of ordinals beside values."""
+        """``options``: all of the codec's, if it has groups of ordinals besides values."""
         signal = motion.signals[index]
-        found = codec.partition(motion.skeleton, options) if codec.partition and options else None
-        self.is_listed = found is not None
+        parts = codec.partition(motion.skeleton, options) if codec.partition and options else None
+        self.is_listed = parts is not None
         kinds = payloads.Groups(kind=group_kind(signal, codec.grouping))
         usual = parse_groups(kinds, motion.skeleton, signal.n_channels, signal.name)
-        groups, exact = found or (usual, ())
+        groups, exact = parts or (usual, ())
         self.is_lossless = codec.lossless
         self.exact = [channel for group in exact for channel in groups[group]]
-        # What a lossy codec returns is no longer the number that an exception spells.
+        # A value from a lossy codec is no longer the number that an exception spells.
         self.signal = signal if codec.lossless else _with_exceptions_of(signal, self.exact)
         self.layout = Layout(
             n_frames=motion.n_frames,
@@ -83,7 +83,7 @@ class MemorySource:
     def _block(self, start: int, stop: int) -> Block:
         """Ordinals of a block, exceptions repeating the row before, and its signal with strays.
 
-        Of a lossy codec those of its exact channels; others have no strays.
+        Of a lossy codec only its exact channels; others have no strays.
         """
         if (start, stop) not in self._settled:
             signal = self.signal.cut(start, stop)
@@ -111,8 +111,10 @@ class MemorySource:
             change = GridChange(channel=column, grid=signal.grids[channel])
             notes[group].grid_changes.append(change)
         before = [0] * len(notes)
-        found = signal.exceptions
-        for number, channel, text in zip(found.rows, found.channels, found.texts, strict=True):
+        exceptions = signal.exceptions
+        for number, channel, text in zip(
+            exceptions.rows, exceptions.channels, exceptions.texts, strict=True
+        ):
             group, column = where[int(channel)]
             row = int(number) - before[group]
             odd = OddToken(row=row, channel=column, text=text)
@@ -121,7 +123,7 @@ class MemorySource:
         return [build(n, "group notes") if n.grid_changes or n.exceptions else b"" for n in notes]
 
     def masks(self, start: int, stop: int) -> list[bytes]:
-        """The mask of each group, b"" where all is valid."""
+        """The mask of each group, b"" if all of it is valid."""
         mask = self.signal.cut(start, stop).mask
         if mask is None:
             return []
@@ -146,18 +148,18 @@ def _freed(signal: Signal, channels: Sequence[int]) -> Signal:
 
 
 def as_stored(motion: Motion) -> Motion:
-    """``motion`` with the numbers that a file holds, of which its source says what they mean.
+    """``motion`` with the stored numbers of a file, which its source scales.
 
-    Without a source that says so, the values are stored as they are, in their units. Raises
-    MotionError where the source says something else than a signal.
+    Without such a source, the values are stored unchanged, in their units. Raises MotionError where
+    the source contradicts a signal.
     """
     if all(signal.scaling is None for signal in motion.signals):
         return motion
-    told = recording_of(motion.source)
-    if told is None:
+    recorded = recording_of(motion.source)
+    if recorded is None:
         return replace(motion, signals=tuple(map(_store_units, motion.signals)))
     for signal in motion.signals:
-        if signal.scaling is not None and not signal.scaling.says(told.scaling):
+        if signal.scaling is not None and not signal.scaling.equals(recorded.scaling):
             raise MotionError(
                 f"signal {signal.name!r}: its source has another scaling; leave out one of the two"
             )
@@ -201,8 +203,8 @@ def _valid_exceptions(signal: Signal) -> Exceptions:
     """The exceptions that still spell the value at their row and channel."""
     old = signal.exceptions
     meant, bad = values_of_texts(old.texts)
-    held = signal.values[old.rows, old.channels]
-    same = (meant.view(np.int64) == held.view(np.int64)) | (np.isnan(meant) & np.isnan(held))
+    now = signal.values[old.rows, old.channels]
+    same = (meant.view(np.int64) == now.view(np.int64)) | (np.isnan(meant) & np.isnan(now))
     keep = np.flatnonzero(same & ~bad)
     texts = tuple(old.texts[i] for i in keep)
     return Exceptions(old.rows[keep], old.channels[keep], texts)

@@ -52,7 +52,7 @@ class EncodingOptions:
         codec_by_name(self.codec)
 
     @property
-    def found(self) -> Codec:
+    def selected_codec(self) -> Codec:
         return codec_by_name(self.codec)
 
 
@@ -65,11 +65,11 @@ def encoding_options(
 
 @dataclass(frozen=True, slots=True)
 class WritingOptions:
-    """Options of the file that is written.
+    """Options of the output file.
 
-    ``force`` replaces a file that is there. ``copies``: what holds clips together stands in the
-    file a second time. ``threads`` may code at once, by default one a processor, and ``jobs``
-    processes, by default one; the bytes are the same.
+    ``force`` replaces an existing file. ``copies``: chunks that clips depend on are stored a second
+    time. ``threads`` encode in parallel, by default one a processor, and ``jobs`` processes, by
+    default one; the bytes are the same.
     """
 
     force: bool = False
@@ -81,8 +81,8 @@ class WritingOptions:
 
     @contextmanager
     def in_force(self) -> Iterator[None]:
-        """Let what is called meanwhile use so many threads and processes."""
-        with threads.limited(self.threads), jobs.limited(self.jobs):
+        """Limit threads and processes of calls within the block."""
+        with threads.limit_threads(self.threads), jobs.limit_jobs(self.jobs):
             yield
 
 
@@ -93,18 +93,18 @@ class SourceEncoder:
         self, path: Path, name: str, options: SourceOptions, encoding: EncodingOptions
     ) -> None:
         self.path, self.name, self.options, self.encoding = path, name, options, encoding
-        self.reason = ""  # why it was kept verbatim
-        self.remark = ""  # of the skeleton, where that may be another's
-        self.notes: tuple[str, ...] = ()  # what its reader noticed
-        self.inputs: list[Path] = [path]  # the files that it was made of
-        self.quality: dict[str, str] | None = None  # of a lossy clip what its record says
+        self.reason = ""  # for keeping it verbatim
+        self.remark = ""  # on a skeleton that may not be its own
+        self.notes: tuple[str, ...] = ()  # remarks of its reader
+        self.inputs: list[Path] = [path]  # its source files
+        self.quality: dict[str, str] | None = None  # the quality record of a lossy clip
 
     def digest(self) -> bytes:
         return hashlib.sha256(read_bytes(self.path)).digest()
 
     @property
     def source_bytes(self) -> int:
-        """The size of the file, and of the ASF that is kept with it."""
+        """The size of the file, and of the ASF that is stored with it."""
         kept = self.inputs[:1] if self.reason else dict.fromkeys(self.inputs)
         return sum(path.stat().st_size for path in kept)
 
@@ -130,7 +130,7 @@ class SourceEncoder:
         return result
 
     def _given_skeleton(self, data: bytes) -> Given:
-        """The skeleton that was asked for; that it cannot be read is not the source's fault."""
+        """The requested skeleton, whose errors are not the source's fault."""
         given = self.options.skeleton
         if given is None or given == NONE or not wants_skeleton(self.path, data):
             return None if given is None else NONE
@@ -153,8 +153,8 @@ class SourceEncoder:
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
         motion = replace(motion, name=clip_name(self.name, writer.directory))
-        codec, params = self.encoding.found, self.encoding.params
-        if not codec.lossless:  # the file does not come back: what comes states its rate
+        codec, params = self.encoding.selected_codec, self.encoding.params
+        if not codec.lossless:  # the restored file differs: it states its rate
             motion = stating_rate(motion)
         base = None if taken.skeleton is None else self._store_skeleton(taken.skeleton)
         prepared = prepare(motion, codec, params, stored_with_base(motion.skeleton, base))
@@ -165,13 +165,13 @@ class SourceEncoder:
         """Keep what is odd about a file once the options have told what it left open."""
         self.remark = taken.remark
         keys = ("source-note", *(() if taken.skeleton is not None else (NOTE,)))
-        found = (motion.metadata.get(key, "") for key in keys)
-        self.notes = tuple(filter(None, found))
+        notes = (motion.metadata.get(key, "") for key in keys)
+        self.notes = tuple(filter(None, notes))
         if taken.chosen is not None and taken.chosen.path is not None:
             self.inputs.append(taken.chosen.path)
 
     def _store_skeleton(self, skeleton: Skeleton) -> StoredSkeleton:
-        """The skeleton of an ASF, under its own name where that is kept."""
+        """The skeleton of an ASF, under its own name if that is kept."""
         if not self.options.keep_skeleton:
             return StoredSkeleton(skeleton)
         path = skeleton.source.path if skeleton.source is not None else ""
@@ -179,7 +179,7 @@ class SourceEncoder:
 
 
 def rate_notes(stated: Fraction | None, options: SourceOptions) -> Iterator[str]:
-    """A note where the frame rate that a file states is not the one that was asked for."""
+    """A note if the frame rate in a file differs from the requested one."""
     if stated is None or options.rate is None:
         return
     asked = float(parse_rate(options.rate))

@@ -1,8 +1,7 @@
-"""Trials of parameters: the clip is written to memory, and measured as a reader has it.
+"""Trials of parameters: the clip is written to memory, and measured by the public reader.
 
-Nothing is trusted that the public reader did not give. ``meet_bound`` meets a greatest error by
-finer steps where it is missed, ``weigh_joints`` the mean errors of joints by what each of them
-weighs.
+``meet_bound`` meets a greatest error by finer steps in frames that miss it, ``weigh_joints`` the
+mean errors of joints by a weight for each.
 """
 
 from __future__ import annotations
@@ -31,11 +30,9 @@ from mcz.kinematics.joint_groups import find_joints
 from mcz.kinematics.metrics import Comparison, compare
 from mcz.kinematics.metrics.sums import channel_errors
 from mcz.model.motion import Motion
-from mcz.model.types import JsonObject, Params
+from mcz.model.types import Floats, JsonObject, Params
 
-Floats = NDArray[np.float64]
-
-BLOCK_FRAMES = 4096  # whose positions are in memory at a time
+BLOCK_FRAMES = 4096  # with positions in memory at a time
 
 REFINEMENT = "refinement"
 MOST_OCTAVES = 7
@@ -45,13 +42,13 @@ FINER = 0.85  # from one step to the next
 USUAL_STEP = 1.0  # of a bound of channels, whose steps follow from it
 MOST_CALIBRATIONS = 3
 MOST_MEANS, MOST_QUARTERS = 12, 100
-COMMON = 0.9  # of the frames have at most an error, in bounds, that is wanted within a range
+COMMON = 0.9  # share of the frames whose error, in bounds, should be within a range
 LEAST_COMMON, WANTED_COMMON, MOST_COMMON = 0.55, 0.75, 1.1
-MARGIN = 0.3  # octaves that are added to what a frame misses
+MARGIN = 0.3  # octaves added to the miss of a frame
 Limits = Sequence[tuple[str, float]]  # a joint or a group of joints, and its limit in cm
 QUALITY, WEIGHTS, LIKE = "quality", "weights", "like"
 MOST_WEIGHINGS = 8
-OVER = 1.15  # by how much more a weight grows than the square of what is missed
+OVERCORRECTION = 1.15  # growth of a weight relative to the square of the miss
 MOST_WEIGHT = 2.0**24
 
 
@@ -60,7 +57,7 @@ class Target:
     """A target: the figure of that name must not exceed ``limit``.
 
     ``falls``: the figure falls as the files get smaller (a size), instead of rising (an error).
-    ``weights``, (n_channels,), multiply the errors of channels; None where it is none of those.
+    ``weights``, (n_channels,), multiply the errors of channels; None for other figures.
     """
 
     name: str
@@ -76,33 +73,33 @@ class Trials:
         self.motion, self.codec, self.params, self.profile = motion, codec, params, profile
         self.alone = replace(motion, signals=motion.signals[:1])
         self.others = 0.0  # bytes of the further signals, which no dial changes
-        self.kept: JsonObject = {}  # what the first trial has chosen for all
+        self.kept: JsonObject = {}  # choices of the first trial, for all
 
-    def given(self, more: Params) -> Trials:
-        """Trials with more parameters, and what was chosen before."""
-        found = Trials(self.motion, self.codec, {**self.params, **more}, self.profile)
-        found.kept = self.kept
-        return found
+    def with_params(self, more: Params) -> Trials:
+        """Trials with more parameters, and earlier choices."""
+        trials = Trials(self.motion, self.codec, {**self.params, **more}, self.profile)
+        trials.kept = self.kept
+        return trials
 
     def __call__(self, target: Target, setting: float) -> float:
         """The figure of ``target`` at a setting of the dial."""
         assert self.codec.dial is not None
         return self.figure(target, {self.codec.dial.parameter: setting})
 
-    def figure(self, target: Target, found: Params) -> float:
-        figure = self._measure(self.alone, target, found)
+    def figure(self, target: Target, params: Params) -> float:
+        figure = self._measure(self.alone, target, params)
         if len(self.motion.signals) > 1 and target.falls:
             if not self.others:
-                self.others = self._measure(self.motion, target, found) - figure
+                self.others = self._measure(self.motion, target, params) - figure
             figure += self.others
         return figure
 
-    def frame_errors(self, target: Target, found: Params) -> Floats:
+    def frame_errors(self, target: Target, params: Params) -> Floats:
         """The greatest error of each frame with these parameters, (n_frames,).
 
-        It is that of positions in cm, unless ``target`` is one of channels.
+        Of positions in cm, unless ``target`` is one of channels.
         """
-        clip = self._write_trial(self.alone, found)[1]
+        clip = self._write_trial(self.alone, params)[1]
         unit, decoded = self.motion.skeleton.unit_cm, clip.motion()
         if target.weights is not None:
             errors = self._weighed_errors(target.weights, decoded)
@@ -120,12 +117,12 @@ class Trials:
             greatest[rows] = np.nan_to_num(distances).max(axis=1, initial=0.0) * unit
         return greatest
 
-    def joint_errors(self, found: Params) -> Floats:
+    def joint_errors(self, params: Params) -> Floats:
         """The mean position error of each joint in cm with these parameters, (n_joints,).
 
-        0 for one that has no point.
+        0 for one without points.
         """
-        decoded = self._write_trial(self.alone, found)[1].motion()
+        decoded = self._write_trial(self.alone, params)[1].motion()
         figures = compare(self.alone, decoded, virtual_markers=False, shell_cm=None).by_joint
         unit = self.motion.skeleton.unit_cm
         return np.array([(figure.mean_position_error or 0.0) * (unit or 0.0) for figure in figures])
@@ -133,17 +130,19 @@ class Trials:
     def _weighed_errors(self, weights: Floats, decoded: Motion) -> Floats:
         """The errors of channels times ``weights``, NaN where a value does not count."""
         signal = self.alone.signals[0]
-        given, found = (
+        with_params, decoded_values = (
             np.asarray(one.masked(), np.float64) for one in (signal, decoded.signals[0])
         )
         with np.errstate(all="ignore"):
-            errors: Floats = channel_errors(self.motion.skeleton, signal, given, found) * weights
+            errors: Floats = (
+                channel_errors(self.motion.skeleton, signal, with_params, decoded_values) * weights
+            )
         return errors
 
-    def _write_trial(self, motion: Motion, found: Params) -> tuple[Container, Clip]:
+    def _write_trial(self, motion: Motion, trial_params: Params) -> tuple[Container, Clip]:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ContactWarning)  # that of the clip itself counts
-            params = {**self.params, **self.kept, **found}
+            warnings.simplefilter("ignore", ContactWarning)  # only the clip's own warnings count
+            params = {**self.params, **self.kept, **trial_params}
             data = file_in_memory(Prepared(motion), self.codec, params, self.profile)
         container = Container(open_source(data), max_decoded=2**53)
         clip = Clip(container, container.directory.clips[motion.name])
@@ -151,8 +150,8 @@ class Trials:
             self.kept.setdefault(LIKE, clip.signals[0].header)
         return container, clip
 
-    def _measure(self, motion: Motion, target: Target, found: Params) -> float:
-        container, clip = self._write_trial(motion, found)
+    def _measure(self, motion: Motion, target: Target, params: Params) -> float:
+        container, clip = self._write_trial(motion, params)
         if target.weights is not None:
             errors = self._weighed_errors(target.weights, clip.motion())
             n = np.isfinite(errors).sum(axis=0) if target.name == MEAN_ERROR else 1
@@ -179,24 +178,24 @@ def _error(target: Target, comparison: Comparison) -> float:
 
 
 def meet_bound(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
-    """A step and the refinement of frames that meet the bound, and what the record says of it.
+    """A step and the refinement of frames that meet the bound, and entries of the quality record.
 
-    Raises OptionError where none that was tried does.
+    Raises OptionError if no tried one does.
     """
     guessed = dial.guess and dial.guess(target.name, target.limit)
     step = min(max(guessed or _first_step(dial, target, trial), dial.low), dial.high)
     for _ in range(MOST_STEPS):
         octaves: NDArray[np.int64] = np.zeros(trial.motion.n_frames, np.int64)
         for _ in range(MOST_ROUNDS):
-            found = {dial.parameter: step, REFINEMENT: octaves}
+            params = {dial.parameter: step, REFINEMENT: octaves}
             try:
-                errors = trial.frame_errors(target, found)
+                errors = trial.frame_errors(target, params)
             except MotionError as error:
                 text = f"{target.name} {target.limit:g} cannot be met: {error}"
                 raise OptionError(text) from error
             if not (errors > target.limit).any():
                 reached = float(errors.max(initial=0.0))
-                return found, {"target_reached": repr(reached)}
+                return params, {"target_reached": repr(reached)}
             octaves = _refine(octaves, errors / target.limit)
         missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
         step = max(step * FINER, dial.low)
@@ -204,7 +203,7 @@ def meet_bound(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, d
 
 
 def _first_step(dial: Dial, target: Target, trial: Trials) -> float:
-    """A step with which most frames keep the bound of their channels, and not by far."""
+    """A step with which most frames keep the bound of their channels closely."""
     step = USUAL_STEP
     for _ in range(MOST_CALIBRATIONS):
         octaves = np.zeros(trial.motion.n_frames, np.int64)
@@ -217,9 +216,9 @@ def _first_step(dial: Dial, target: Target, trial: Trials) -> float:
 
 
 def meet_mean(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
-    """The coarsest step that keeps a mean error of channels, whose steps are quarters of octaves.
+    """The coarsest step that keeps a mean error of channels, in quarters of octaves.
 
-    Raises OptionError where none that was tried does.
+    Raises OptionError if no tried one does.
     """
     place, met, missed = 0, -MOST_QUARTERS, MOST_QUARTERS
     reached, figure = math.inf, math.inf
@@ -242,7 +241,7 @@ def meet_mean(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, di
 
 
 def _refine(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
-    """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and beside it."""
+    """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and next to it."""
     with np.errstate(divide="ignore"):
         missing = np.where(ratios > 1, np.ceil(np.log2(ratios) + MARGIN), 0.0).astype(np.int64)
     padded = np.pad(missing, 1)
@@ -251,18 +250,18 @@ def _refine(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
 
 
 def weigh_joints(
-    dial: Dial, trial: Trials, limits: Limits, found: Params
+    dial: Dial, trial: Trials, limits: Limits, params: Params
 ) -> tuple[JsonObject, dict[str, str]]:
-    """Weights with which the joints keep their ``limits``, with the parameters ``found``.
+    """Weights with which the joints keep their ``limits``, with the parameters ``params``.
 
-    Also returns what the quality record says of it. Raises OptionError where they cannot be kept.
+    Also returns entries of the quality record. Raises OptionError if they cannot be kept.
     """
     skeleton = trial.motion.skeleton
     groups = [(name, find_joints(skeleton, name, QUALITY), limit) for name, limit in limits]
-    given = found.get(WEIGHTS)
-    weights = np.ones(skeleton.n_joints) if given is None else np.array(given)
+    with_params = params.get(WEIGHTS)
+    weights = np.ones(skeleton.n_joints) if with_params is None else np.array(with_params)
     for _ in range(MOST_WEIGHINGS):
-        errors = trial.joint_errors({**found, WEIGHTS: weights})
+        errors = trial.joint_errors({**params, WEIGHTS: weights})
         means = [float(errors[joints].mean()) for _, joints, _ in groups]
         if all(mean <= limit for mean, (_, _, limit) in zip(means, groups, strict=True)):
             remarks = {
@@ -272,10 +271,10 @@ def weigh_joints(
             return {WEIGHTS: weights}, remarks
         for mean, (_, joints, limit) in zip(means, groups, strict=True):
             if mean > limit:
-                factor = (mean / limit) ** 2 * OVER
+                factor = (mean / limit) ** 2 * OVERCORRECTION
                 weights[joints] = np.minimum(weights[joints] * factor, MOST_WEIGHT)
     worst = max(zip(means, groups, strict=True), key=lambda pair: pair[0] / pair[1][2])
     raise OptionError(
         f"quality: {worst[1][0]}={worst[1][2]:g}cm cannot be kept with {dial.parameter} "
-        f"{found.get(dial.parameter)}: {worst[0]:g} cm was reached"
+        f"{params.get(dial.parameter)}: {worst[0]:g} cm was reached"
     )

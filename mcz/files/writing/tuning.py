@@ -1,7 +1,6 @@
-"""Sizes and errors as targets: the dial of a codec is turned until they are met, and it is proved.
+"""Sizes and errors as targets: the dial of a codec is searched until they are verified.
 
-Every trial is a file in memory that the public reader opens; nothing is trusted that it did not
-measure.
+Every trial is a file in memory that the public reader opens and measures.
 """
 
 from __future__ import annotations
@@ -45,15 +44,15 @@ from mcz.model.types import JsonObject, Params, Progress
 
 PRESET, LIMITS = "preset", "limits"
 GOAL = 0.985  # of a target: near enough to stop
-PROMISED = 0.97  # of a target: what is less is remarked upon
+PROMISED = 0.97  # of a target: less is remarked upon
 MOST_TRIALS = 60
-MOST_TURNS = 4  # of weights and a target, each found for the other
+MOST_TURNS = 4  # of weights and a target, each adjusted to the other
 CLOSE = 1.00002  # between a setting that meets the target and one that does not
 GUESSED = 1.25  # from a setting that was guessed to the next
-SAME = 3  # figures in a row that do not differ: the next setting is the last of the range
-NEAR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried beside the one that was found
+MOST_EQUAL = 3  # equal figures in a row: the next setting is the last of the range
+NEAR_FACTOR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried near the best one
 
-Found = tuple[JsonObject, dict[str, str]]  # parameters, and what the quality record says
+Tuned = tuple[JsonObject, dict[str, str]]  # parameters, and entries of the quality record
 Point = tuple[float, float]  # a setting and its figure
 
 
@@ -66,19 +65,19 @@ def write_motion(
     *,
     amend: Amend | None = None,
 ) -> dict[str, str] | None:
-    """Write a clip, a size or an error among ``params`` met first.
+    """Write a clip after meeting a size or an error among ``params``.
 
-    Returns what the quality record says, ``amend`` has the last word on it; None where there is
-    none. Raises OptionError where a target cannot be met or has no meaning for this clip.
+    Returns the quality record, which ``amend`` edits last; None if there is none. Raises
+    OptionError where a target cannot be met or has no meaning for this clip.
     """
     motion, bounded_signals = with_bounds(prepared.motion, codec, params)
-    found, remarks = tune(motion, codec, of_codec(params), writer.profile)
-    plan = plan_clip(replace(prepared, motion=motion), codec, found, writer.profile)
+    options, remarks = tune(motion, codec, of_codec(params), writer.profile)
+    plan = plan_clip(replace(prepared, motion=motion), codec, options, writer.profile)
     remarks |= bounded_signals
     return write_plan(writer, plan, progress, remarks=remarks, amend=amend)
 
 
-def tune(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Found:
+def tune(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Tuned:
     """``params`` with a setting of the dial that meets the targets among them, on trial files."""
     options = codec.options(params)
     targets = find_targets(options)
@@ -99,16 +98,16 @@ def tune(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Foun
     target = _target(motion, codec.dial, options, targets) if targets else None
     trial = Trials(motion, codec, params, profile)
     if target and target.weights is not None and codec.has(LIMITS):
-        trial = trial.given({LIMITS: target.limit / target.weights})
+        trial = trial.with_params({LIMITS: target.limit / target.weights})
     if limits:
-        found, remarks = _with_quality(codec, target, trial, limits)
+        settings, remarks = _with_quality(codec, target, trial, limits)
     else:
-        found, remarks = _meet_target(codec, target, trial)
-    return {**trial.params, **trial.kept, **found}, remarks
+        settings, remarks = _meet_target(codec, target, trial)
+    return {**trial.params, **trial.kept, **settings}, remarks
 
 
 def _check_preset(codec: Codec, params: Params, options: Params, targets: Params) -> None:
-    """A preset that promises an error stands beside nothing that says another."""
+    """Check that a preset that promises an error is the only option that does."""
     if not (codec.promise and codec.dial) or params.get(PRESET) is None:
         return
     others = [*targets, *([codec.dial.parameter] if options[codec.dial.parameter] else [])]
@@ -116,8 +115,8 @@ def _check_preset(codec: Codec, params: Params, options: Params, targets: Params
         raise OptionError(f"{PRESET} and {others[0]} are given, only one can be")
 
 
-def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Limits) -> Found:
-    """Weights of joints beside what meets a target.
+def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Limits) -> Tuned:
+    """Weights of joints, and settings that meet a target.
 
     Not with a coarser step for all joints, which the weights would allow: that took more bytes.
     """
@@ -125,16 +124,16 @@ def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Li
     _check_unit(trial.motion, QUALITY)
     weights: JsonObject = {}
     for _ in range(MOST_TURNS):
-        found, remarks = _meet_target(codec, target, trial.given(weights))
-        weights, kept = weigh_joints(codec.dial, trial, limits, {**found, **weights})
-        both = {**found, **weights}
+        settings, remarks = _meet_target(codec, target, trial.with_params(weights))
+        weights, kept = weigh_joints(codec.dial, trial, limits, {**settings, **weights})
+        both = {**settings, **weights}
         if target is None or trial.figure(target, both) <= target.limit:
             return both, {**remarks, **kept}
     name = "" if target is None else f"{target.name} {target.limit:g}"
     raise OptionError(f"{QUALITY} and {name} cannot both be kept")
 
 
-def _meet_target(codec: Codec, target: Target | None, trial: Trials) -> Found:
+def _meet_target(codec: Codec, target: Target | None, trial: Trials) -> Tuned:
     assert codec.dial is not None
     if target is None:
         return {}, {}
@@ -163,7 +162,7 @@ def _check_places(motion: Motion, dial: Dial, target: Target) -> None:
         ) from error
 
 
-def _search_dial(dial: Dial, target: Target, trial: Trials) -> Found:
+def _search_dial(dial: Dial, target: Target, trial: Trials) -> Tuned:
     setting, reached, ended = search(dial, target, trial)
     remarks = {"target_reached": repr(reached)}
     if reached < PROMISED * target.limit:
@@ -191,7 +190,6 @@ def _target(motion: Motion, dial: Dial, options: Params, targets: Params) -> Tar
 
 
 def _channel_target(motion: Motion, name: str, text: str) -> Target:
-    """A target of channels, in the unit of the first of its bounds."""
     signal = motion.signals[0]
     channels = motion.skeleton.channels if signal.channels is None else signal.channels
     limits = limits_of(motion.skeleton, channels, name, text)
@@ -204,11 +202,11 @@ def _channel_target(motion: Motion, name: str, text: str) -> Target:
 def search(
     dial: Dial, target: Target, measure: Callable[[Target, float], float]
 ) -> tuple[float, float, bool]:
-    """The setting that comes nearest to the target, of those tried, without exceeding it.
+    """The setting nearest to the target, of those tried, without exceeding it.
 
     Returns the setting, its figure, and whether the range of the dial ended before the target.
-    Raises OptionError where no setting meets it. A figure may jump, up and down: a greatest error
-    does.
+    Raises OptionError where no setting meets it. A figure such as a greatest error may jump up and
+    down.
     """
     tried: list[Point] = []
 
@@ -227,11 +225,11 @@ def search(
         setting = _between(meets, misses, target.limit)
         if dial.whole:  # strictly between the two
             setting = min(max(round(setting), low + 1), high - 1)
-        found = setting, _measure_figure(dial, measured, target, setting)
-        if found[1] <= target.limit:
-            meets = found
+        point = setting, _measure_figure(dial, measured, target, setting)
+        if point[1] <= target.limit:
+            meets = point
         else:
-            misses = found
+            misses = point
     met = (point for point in reversed(tried) if point[1] <= target.limit)
     best = max(met, key=itemgetter(1))
     if best[1] < PROMISED * target.limit:
@@ -242,17 +240,17 @@ def search(
 def _search_beside(
     best: Point, dial: Dial, target: Target, measure: Callable[[Target, float], float]
 ) -> Point:
-    """A setting beside ``best`` that keeps the promise, or else the best of all."""
+    """A setting near ``best`` that keeps the promise, or else the best of all."""
     middle = best[0]
     for power in range(1, NEIGHBORS + 1):
-        beside = (middle * NEAR**power, middle / NEAR**power)
+        beside = (middle * NEAR_FACTOR**power, middle / NEAR_FACTOR**power)
         if dial.whole:
             beside = (middle + power, middle - power)
         for setting in beside:
             if dial.low <= setting <= dial.high:
-                found = setting, _measure_figure(dial, measure, target, setting)
-                if found[1] <= target.limit:
-                    best = max(best, found, key=itemgetter(1))
+                point = setting, _measure_figure(dial, measure, target, setting)
+                if point[1] <= target.limit:
+                    best = max(best, point, key=itemgetter(1))
         if best[1] >= PROMISED * target.limit:
             break
     return best
@@ -263,34 +261,34 @@ def _bracket(
 ) -> tuple[Point, Point, bool]:
     guessed = dial.guess and dial.guess(target.name, target.limit)
     setting = _fit_range(dial, guessed or 1.0)
-    found = setting, _measure_figure(dial, measure, target, setting)
-    first_meets = found[1] <= target.limit
+    point = setting, _measure_figure(dial, measure, target, setting)
+    first_meets = point[1] <= target.limit
     falls = target.falls != dial.rises  # as the dial goes up
-    upwards = first_meets != falls  # where the other side of the target lies
+    upwards = first_meets != falls  # direction of the other side of the target
     factor, same = GUESSED if guessed else 2.0, 1
     while True:
         end = dial.high if upwards else dial.low
         if setting == end:
             if first_meets:
-                return found, found, True
+                return point, point, True
             raise OptionError(
                 f"{target.name} {target.limit:g} cannot be met: {dial.parameter} {setting:g} "
-                f"gives {found[1]:g}"
+                f"gives {point[1]:g}"
             )
         moved = setting * factor if upwards else setting / factor
-        setting = end if same == SAME else _fit_range(dial, moved)
+        setting = end if same == MOST_EQUAL else _fit_range(dial, moved)
         factor = min(factor * 2, 2.0**8)
         other = setting, _measure_figure(dial, measure, target, setting)
         if (other[1] <= target.limit) != first_meets:
-            return (found, other, False) if first_meets else (other, found, False)
-        same = same + 1 if other[1] == found[1] else 1
-        found = other
+            return (point, other, False) if first_meets else (other, point, False)
+        same = same + 1 if other[1] == point[1] else 1
+        point = other
 
 
 def _measure_figure(
     dial: Dial, measure: Callable[[Target, float], float], target: Target, setting: float
 ) -> float:
-    """The figure of a setting; one that the codec refuses as too fine has no bound on its size."""
+    """The figure of a setting; one that the codec refuses as too fine has an infinite size."""
     try:
         return measure(target, int(setting) if dial.whole else setting)
     except MotionError as error:
@@ -310,6 +308,6 @@ def _between(meets: Point, misses: Point, limit: float) -> float:
     low, high = math.log(meets[0]), math.log(misses[0])
     share = 0.5
     if 0 < meets[1] < misses[1] < math.inf:
-        wanted = math.log(0.5 * (1 + GOAL) * limit)
-        share = (wanted - math.log(meets[1])) / (math.log(misses[1]) - math.log(meets[1]))
+        target = math.log(0.5 * (1 + GOAL) * limit)
+        share = (target - math.log(meets[1])) / (math.log(misses[1]) - math.log(meets[1]))
     return math.exp(low + min(max(share, 0.05), 0.95) * (high - low))

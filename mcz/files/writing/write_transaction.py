@@ -1,4 +1,4 @@
-"""A file that is being written in steps, a failed one of which leaves no trace, and its names."""
+"""A file that is written in steps, and its names; a failed step leaves no trace."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ METADATA_KEYS = tuple(KEYS)
 
 
 class WriteTransaction:
-    """A file that is being written in steps: a step that fails leaves no trace.
+    """A file that is written in steps: a failed step leaves no trace.
 
-    ``paths`` tells what the file restores under each path: the SHA-256 of those bytes, or a
-    function that finds it. With ``hold`` False what is written goes straight to ``sink``, so that
-    nothing can be taken back; that needs no memory and suits a file of one step. ``copies``,
-    ``uncopied`` and ``short`` are those of ``Writer``.
+    ``paths`` has the SHA-256 of the restored file of each path, or a function that computes it.
+    With ``hold`` False output goes straight to ``sink``, so that no step can be undone; that needs
+    no memory and suits a file of one step. ``copies``, ``uncopied`` and ``short`` are those of
+    ``Writer``.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class WriteTransaction:
     ) -> None:
         self._sink, self._pending, self._hold = sink, io.BytesIO(), hold
         self.paths = dict(paths or {})
-        self.clips: dict[str, str] = {}  # what the clip of each file is called that was written
+        self.clips: dict[str, str] = {}  # names of the written clips, by file
         offset = directory.end if directory is not None else 0
         self.writer = Writer(
             self,
@@ -65,13 +65,13 @@ class WriteTransaction:
         return (self._pending if self._hold else self._sink).write(data)
 
     def keep(self) -> None:
-        """Keep what was written since the last step."""
+        """Keep the output since the last step."""
         self._sink.write(self._pending.getbuffer())
         self._pending = io.BytesIO()
 
     @contextmanager
     def step(self) -> Iterator[None]:
-        """Keep what the block writes, if the block ends without an error."""
+        """Keep the output of the block, if it ends without an error."""
         before, offset = _snapshot(self.writer.directory), self.writer.offset
         try:
             yield
@@ -103,14 +103,14 @@ def _snapshot(directory: Directory) -> Directory:
 
 
 def alias_once(writer: Writer, name: str, id_: bytes) -> None:
-    """Let ``name`` be that of the skeleton ``id_``, unless it is another's already."""
+    """Name the skeleton ``id_`` as ``name``, unless another has that name."""
     check_name(name)
     if name not in writer.directory.aliases:
         writer.alias(name, payloads.OF_SKELETON, id_)
 
 
 def check_name(path: str) -> None:
-    """Raise MotionError where a file cannot be stored and restored under ``path``."""
+    """Raise MotionError if a file cannot be stored and restored under ``path``."""
     try:
         path.encode("utf-8")
     except UnicodeEncodeError:
@@ -133,6 +133,6 @@ def check_metadata(metadata: Mapping[str, str], name: str) -> None:
 
 
 def clip_name(path: str, directory: Directory) -> str:
-    """The relative path without its suffix; with it, or a number, where that name is taken."""
+    """The relative path without its suffix; with it, or a number, if that name is taken."""
     names = chain((Path(path).with_suffix("").as_posix(), path), (f"{path}#{n}" for n in count(2)))
     return next(name for name in names if name not in directory.clips)

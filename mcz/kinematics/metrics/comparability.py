@@ -1,4 +1,4 @@
-"""Checks of what can be compared between two motions; differences become notes."""
+"""Checks which figures of two motions can be compared; differences become notes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,6 @@ def common_unit(a: Skeleton, b: Skeleton, notes: list[str]) -> tuple[Number, flo
 
 
 def _kinds(motion: Motion) -> list[tuple[str, str]]:
-    """Kind and name of every channel of the motion signal."""
     own = motion.signals[0].channels
     return [(c.kind, c.name) for c in (motion.skeleton.channels if own is None else own)]
 
@@ -97,7 +96,7 @@ def same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
 def same_axes(a: Skeleton, b: Skeleton, notes: list[str]) -> bool:
     """Return True if both have the same number of joints with axes: turning ones or markers.
 
-    Or the other has virtual markers as markers.
+    Also if the other has virtual markers as markers.
     """
     if has_markers_of(a, b):
         return True

@@ -35,7 +35,7 @@ from mcz.kinematics.points import check_radius
 from mcz.model.motion import Motion, Signal, Skeleton
 from mcz.model.types import Floats
 
-BLOCK = 2**19  # numbers that are worked on at a time: what bounds the memory
+BLOCK = 2**19  # numbers a block, which bounds the memory
 
 
 def compare(
@@ -48,14 +48,14 @@ def compare(
 ) -> Comparison:
     """The figures of ``decoded`` against ``original``, defined in docs/reference/measures.md.
 
-    ``virtual_markers=False`` leaves out the figures of virtual markers, ``shell_cm=None`` those of
-    the shell, whose radius it is: each takes about a quarter of the time. ``contacts`` measures the
+    ``virtual_markers=False`` leaves out the figures of virtual markers, ``shell_cm=None`` (the
+    radius) those of the shell; each costs about a quarter of the time. ``contacts`` measures the
     sliding of feet that stand in the original: True finds feet by their names, joints (index or
     name) name them, ``Contacts`` give their runs. Figures that do not apply to the two motions
     (different channels or points) are None, with a note.
 
-    Raises MotionError where the two differ in frames, or in rows a frame, or have no such joint
-    as ``contacts`` names, and OptionError where ``shell_cm`` is no length.
+    Raises MotionError where the two differ in frames or in rows a frame, or lack a joint in
+    ``contacts``, and OptionError for a bad ``shell_cm``.
     """
     a, b = original.signals[0], decoded.signals[0]
     if a.n_frames != b.n_frames or a.samples_per_frame != b.samples_per_frame:
@@ -68,34 +68,34 @@ def compare(
     notes: list[str] = []
     unit, scale = common_unit(original.skeleton, decoded.skeleton, notes)
     channels = ChannelErrors(original.skeleton, a)
-    same = same_channels(original, decoded, notes)
-    placed = same_points(original, decoded, notes)
-    places = PositionErrors(original, decoded, scale, placed)
-    if placed and unit is not None:
-        places.enable(virtual_markers, shell_cm, contacts, notes)
-    with np.errstate(all="ignore"):  # what overflows is no figure
+    has_same_channels = same_channels(original, decoded, notes)
+    has_same_points = same_points(original, decoded, notes)
+    errors = PositionErrors(original, decoded, scale, has_same_points)
+    if has_same_points and unit is not None:
+        errors.enable(virtual_markers, shell_cm, contacts, notes)
+    with np.errstate(all="ignore"):  # overflow gives inf, which is reported as None
         for start, left, right in _blocks(original, decoded):
-            if same:
+            if has_same_channels:
                 channels.add(left, right)
-            if placed:
-                places.add(start, left, right)
+            if has_same_points:
+                errors.add(start, left, right)
         further = _further_signals(original, decoded, notes)
-    velocities, accelerations = places.velocities(unit), places.accelerations(unit)
-    points, markers, shell = places.points, places.markers, places.shell
+    velocities, accelerations = (errors.velocities(unit), errors.accelerations(unit))
+    points, markers, shell = errors.points, errors.markers, errors.shell
     return Comparison(
         frames=a.n_frames,
-        channels=a.n_channels if same else None,
+        channels=a.n_channels if has_same_channels else None,
         mse=channels.mse,
         mse_raw=channels.mse_raw,
-        mismatched_values=channels.mismatched if same else None,
-        point_set=point_set(original.skeleton) if placed else None,
-        points=len(points.counts) if placed else None,
+        mismatched_values=channels.mismatched if has_same_channels else None,
+        point_set=point_set(original.skeleton) if has_same_points else None,
+        points=len(points.counts) if has_same_points else None,
         unit_cm=unit,
         rms_coordinate_error=points.rms,
         mean_position_error=points.mean,
         max_position_error=points.greatest,
-        where=places.point_where(),
-        mismatched_points=points.mismatched if placed else None,
+        where=errors.point_where(),
+        mismatched_points=points.mismatched if has_same_points else None,
         sqnr_db=points.sqnr_db,
         mean_velocity_error_cm_s=velocities[0],
         max_velocity_error_cm_s=velocities[1],
@@ -103,12 +103,12 @@ def compare(
         max_acceleration_error_cm_s2=accelerations[1],
         virtual_marker_mean_cm=times(markers.mean, unit),
         virtual_marker_max_cm=times(markers.greatest, unit),
-        shell_radius_cm=None if shell.mean is None else places.shell_cm,
+        shell_radius_cm=None if shell.mean is None else errors.shell_cm,
         shell_mean_cm=times(shell.mean, unit),
         shell_max_cm=times(shell.greatest, unit),
-        shell_where=places.shell_where(),
-        sliding=places.sliding(),
-        by_joint=places.by_joint(unit),
+        shell_where=errors.shell_where(),
+        sliding=errors.sliding(),
+        by_joint=errors.by_joint(unit),
         signals=further,
         notes=tuple(notes),
     )
@@ -127,7 +127,7 @@ def _blocks(original: Motion, decoded: Motion) -> Iterator[tuple[int, Floats, Fl
 
 
 def named_signals(motion: Motion) -> dict[str, Signal]:
-    """Signals beside the motion by role or name; repeated keys get a suffix ``#n``."""
+    """Signals other than the motion by role, else name; the second of a name is NAME#1."""
     signals: dict[str, Signal] = {}
     seen: dict[str, int] = {}
     for signal in motion.signals[1:]:
@@ -150,12 +150,12 @@ def _further_signals(original: Motion, decoded: Motion, notes: list[str]) -> dic
 
 
 def signal_errors(skeleton: Skeleton, original: Signal, decoded: Signal) -> ChannelErrors:
-    """The errors of a signal of the same shape."""
+    """The errors of a signal; both have one shape."""
     errors = ChannelErrors(skeleton, original)
     step = max(1, BLOCK // max(1, original.n_channels * original.samples_per_frame))
     for start in range(0, original.n_frames, step):
         stop = min(original.n_frames, start + step)
-        with np.errstate(all="ignore"):  # what overflows is no figure
+        with np.errstate(all="ignore"):  # overflow gives inf, which is reported as None
             errors.add(rows_of(original, start, stop), rows_of(decoded, start, stop))
     return errors
 
@@ -166,14 +166,16 @@ Feet = Contacts | Sequence[int | str] | bool
 class PositionErrors:
     """Distances of points and, on request, of markers, shells and feet, in units of the original.
 
-    ``scale`` brings lengths of the decoded side into these. Without ``placed`` there are no points
-    in common, and no figures.
+    ``scale`` converts lengths of the decoded side to these. Without ``has_same_points`` there are
+    no figures.
     """
 
-    def __init__(self, original: Motion, decoded: Motion, scale: float, placed: bool) -> None:
+    def __init__(
+        self, original: Motion, decoded: Motion, scale: float, has_same_points: bool
+    ) -> None:
         self._original, self._decoded, self._scale = original, decoded, scale
         self._a, self._b = original.skeleton, decoded.skeleton
-        self._names = point_names(self._a) if placed else ()
+        self._names = point_names(self._a) if has_same_points else ()
         self.points = PointErrors(len(self._names))
         self.changes = ChangeErrors(len(self._names))
         self.markers, self.shell = PointErrors(0), ShellErrors(0)
@@ -184,7 +186,7 @@ class PositionErrors:
     def enable(
         self, virtual_markers: bool, shell_cm: float | None, contacts: Feet, notes: list[str]
     ) -> None:
-        """Measure these, too, where they can be compared; both sides' length units are known."""
+        """Enable figures that the options ask for, where both sides have them; units are known."""
         a, b = self._a, self._b
         if (virtual_markers or shell_cm is not None) and same_axes(a, b, notes):
             if virtual_markers:
@@ -200,7 +202,7 @@ class PositionErrors:
         joints: Sequence[int | str] | None = None
         if isinstance(contacts, Contacts):
             self._contacts, joints = contacts, contacts.joints
-            if not joints:  # nobody looked at any
+            if not joints:  # contacts of no joint
                 return
             if contacts.n_frames != self._original.n_frames:
                 raise MotionError(
@@ -233,7 +235,6 @@ class PositionErrors:
                 tracks.add(start // per_frame, places.points[::per_frame])
 
     def _decoded_places(self, values: Floats, markers: bool) -> Places:
-        """The places of the decoded side, in units of the original."""
         if has_markers_of(self._a, self._b):  # points and virtual markers as markers
             both = places_of(self._b, values).points
             n = len(self._names)
@@ -245,11 +246,11 @@ class PositionErrors:
         return Places(*(each * self._scale for each in places))
 
     def point_where(self) -> tuple[int, str] | None:
-        """Frame and point of the greatest distance, the first of equals."""
+        """Frame and point of the greatest distance; ties: the first."""
         return self._where(self.points, self._names)
 
     def shell_where(self) -> tuple[int, str] | None:
-        """Frame and joint of the greatest distance of the shell, the first of equals."""
+        """Frame and joint of the greatest distance of the shell; ties: the first."""
         return self._where(self.shell, self._a.addresses())
 
     def _where(self, errors: Distances, names: Sequence[str]) -> tuple[int, str] | None:
@@ -274,7 +275,7 @@ class PositionErrors:
         if unit is None or rate is None:
             return None, None
         factor = unit
-        for _ in range(order):  # beyond binary64 it is infinite, and there is no figure
+        for _ in range(order):  # overflow gives inf, which is reported as None
             factor *= float(rate * self._original.signals[0].samples_per_frame)
         return times(errors.mean, factor), times(errors.greatest, factor)
 
@@ -295,7 +296,7 @@ class PositionErrors:
         """The figures of every joint, in order; none without points."""
         if not self._names:
             return ()
-        names, sizes = self._a.addresses(), [len(own) for own in points_of(self._a)]
+        names, sizes = self._a.addresses(), [len(points) for points in points_of(self._a)]
         points, shells = self.points.by_group(sizes), self.shell.by_group([1] * len(sizes))
         return tuple(
             JointFigures(

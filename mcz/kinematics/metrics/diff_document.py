@@ -28,8 +28,8 @@ def diff_document(
     """The figures of ``b`` against ``a``, the original; docs/reference/scripts.md has the keys.
 
     ``start`` is the first frame of both in their clips, from which frames are counted. ``contacts``
-    as ``compare`` takes them; None: of feet where names say so. ``by_joint`` and ``contact_list``
-    add those lists. Raises MotionError for motions of different length.
+    as in ``compare``; None: contacts of feet found by name. ``by_joint`` and ``contact_list`` add
+    those lists. Raises MotionError for motions of different length.
     """
     if contacts is None:
         contacts = bool(find_feet(a.skeleton))
@@ -72,7 +72,7 @@ def _feet(comparison: Comparison) -> JsonObject | None:
 
 
 def _equal_joints(a: Motion, b: Motion) -> list[str]:
-    """The joints of the same name whose channels are the same in every bit of every frame."""
+    """The joints of the same name whose channels are bit for bit equal in every frame."""
     if any(not motion.signals[0].has_poses for motion in (a, b)):
         return []
     theirs = {name: joint for joint, name in enumerate(b.skeleton.addresses())}

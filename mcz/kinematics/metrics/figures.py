@@ -1,4 +1,4 @@
-"""The figures of one motion against another, as they are handed out."""
+"""The figures of one motion against another, as results."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ NO_CONTACTS = dict.fromkeys(
 class JointFigures:
     """One joint: distances of its points, in length units of the original, and of its shell.
 
-    ``frame`` is that of the greatest distance of its points, ``shell_frame`` that of its shell,
-    both from 0. None where there is no such figure.
+    ``frame`` is the frame (from 0) of the greatest distance of its points, ``shell_frame`` of its
+    shell. None where there is no such figure.
     """
 
     joint: str
@@ -56,12 +56,12 @@ class JointFigures:
 class Comparison:
     """The figures of one motion against another; None where there is no such figure.
 
-    Distances are Euclidean, per point, in length units of the original or, ``_cm``, in
-    centimeters; ``mse`` mixes degrees and length units, as the papers do. ``where`` is the frame
-    (from 0) and the point of the greatest distance, ``shell_where`` the frame and the joint of
-    that of the shell; ``notes`` say why a figure is missing. ``signals`` holds the MSE of every
+    Distances are Euclidean, per point, in length units of the original or, ``_cm``, in centimeters;
+    ``mse`` mixes degrees and length units, as the papers do. ``where`` is the frame (from 0) and
+    the point of the greatest distance, ``shell_where`` the frame and the joint of the greatest
+    distance of the shell; ``notes`` explain missing figures. ``signals`` holds the MSE of every
     further signal, by name; ``by_joint`` the distances of every joint of the original, ``sliding``
-    those of its feet where they stand.
+    the distances of its feet where they stand.
     """
 
     frames: int

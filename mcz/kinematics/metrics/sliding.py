@@ -17,11 +17,11 @@ MM = 10.0  # of a cm
 
 @dataclass(frozen=True, slots=True)
 class ContactSlide:
-    """One contact: how far the decoded foot leaves the place that the original's has.
+    """One contact: the distance of the decoded foot from the original's place.
 
-    ``mean_mm`` and ``max_mm`` are of the difference of both feet's displacements from the first
-    frame, over the frames behind it. ``path_mm`` is how far the decoded foot moves in all,
-    ``path_original_mm`` that of the original. None where no position is known.
+    ``mean_mm`` and ``max_mm`` are differences of both feet's displacements from the first frame,
+    over the later frames. ``path_mm`` is the length of the decoded foot's path,
+    ``path_original_mm`` of the original's. None where no position is known.
     """
 
     joint: str
@@ -94,7 +94,7 @@ def sliding(contacts: Contacts, ours: FootTracks, theirs: FootTracks) -> Sliding
 
     Both have the same joints in length units of the original; ``contacts`` may be of fewer.
     """
-    with np.errstate(all="ignore"):  # what overflows is no figure
+    with np.errstate(all="ignore"):  # overflow is no figure
         measured = list(_measure_contacts(contacts, ours, theirs))
         slides = tuple(each.slide() for each in measured)
         apart = [each.apart[np.isfinite(each.apart)] for each in measured]
@@ -128,7 +128,7 @@ def _measure_contacts(
 
 
 def _worst_frame(measured: list[_ContactDistances]) -> tuple[int, str] | None:
-    """Frame and joint of the greatest difference: of equals the first frame, then joint."""
+    """Frame and joint of the greatest difference; ties: the first frame, then joint."""
     worst: list[tuple[float, int, str]] = []
     for each in measured:
         known = np.where(np.isfinite(each.apart), each.apart, -1.0)

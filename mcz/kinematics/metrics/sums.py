@@ -1,4 +1,4 @@
-"""Sums over frames from which figures are made, block after block of frames."""
+"""Sums over frames for figures, block after block of frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Number = float | None
 
 
 def mean_of(total: float, n: int) -> Number:
-    """``total / n``; None without values, or where it is beyond binary64."""
+    """``total / n``; None without values, or beyond binary64."""
     return total / n if n and math.isfinite(total) else None
 
 
@@ -26,7 +26,7 @@ def times(value: Number, factor: Number) -> Number:
 
 
 def channel_errors(skeleton: Skeleton, signal: Signal, left: Floats, right: Floats) -> Floats:
-    """Absolute differences of the channels of ``signal``, less whole turns."""
+    """Absolute differences of the channels of ``signal``, without whole turns."""
     return np.abs(_less_turns(left - right, left, right, skeleton, signal.channels))
 
 
@@ -83,7 +83,7 @@ class ChannelErrors:
 
 
 class Distances:
-    """Mean and greatest of distances that have ``n`` columns, of each column and of all."""
+    """Mean and greatest of distances in ``n`` columns, of each column and of all."""
 
     def __init__(self, n: int) -> None:
         self.counts = np.zeros(n, np.int64)
@@ -115,7 +115,7 @@ class Distances:
 
     @property
     def where(self) -> tuple[int, int] | None:
-        """Row and column of the greatest distance, of equals the first row, then column."""
+        """Row and column of the greatest distance; ties: the first row, then column."""
         if not self.counts.any():
             return None
         worst = self.greatest_by_column == self.greatest_by_column.max()
@@ -182,7 +182,7 @@ class ShellErrors(Distances):
 class ChangeErrors:
     """Differences of velocities and accelerations of ``n`` points, in lengths a row, a row squared.
 
-    Blocks of rows follow one another: the last two rows of one are kept for the next.
+    Blocks of rows follow one another: the last two rows of a block are kept for the next.
     """
 
     def __init__(self, n: int) -> None:

@@ -1,8 +1,8 @@
-"""Poses as arrays with names: where points are, how joints are turned, how fast, at which rate.
+"""Poses as arrays with names: positions, rotations, velocities, resampled motions.
 
-One convention throughout: rotations are active and turn column vectors, a joint's local rotation
-is W_parent^-1 W (W: its rotation in the world), and in the rest pose every rotation is the
-identity. Everything takes a Motion or a Clip, of which only what is needed is decoded.
+One convention throughout: rotations are active and turn column vectors, a joint's local rotation is
+W_parent^-1 W (W: its rotation in the world), and in the rest pose every rotation is the identity.
+Functions take a Motion or a Clip, of which only the needed part is decoded.
 """
 
 from __future__ import annotations

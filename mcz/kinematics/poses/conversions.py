@@ -1,7 +1,7 @@
 """Rotation matrices to other representations and back, with the conventions of SciPy.
 
-Matrices are (..., 3, 3), active, for column vectors. What is NaN stays NaN. Quaternions among plain
-scalars are found here too: four columns of unit norm, which splines would shrink.
+Matrices are (..., 3, 3), active, for column vectors. NaN stays NaN. Quaternions among plain scalars
+are also detected here: four columns of unit norm, which splines would shrink.
 """
 
 from __future__ import annotations
@@ -35,20 +35,20 @@ from mcz.model.skeleton import Joints
 from mcz.model.text_format import shown
 from mcz.model.types import Floats, Reals
 
-# What each representation adds to the shape of an array of rotations.
+# Dimensions that each representation adds to an array of rotations.
 FORMS = {"matrix": (3, 3), "quat": (4,), "rotvec": (3,), "6d": (6,), "euler": (3,)}
 
 LOCKED = 1e-7  # radians from gimbal lock within which the third Euler angle is 0
 
 
 def check_form(form: str) -> None:
-    """Raise OptionError where ``form`` is no representation."""
+    """Raise OptionError unless ``form`` is a representation."""
     if form not in FORMS:
         raise OptionError(f"rotations as {form!r}: one of {', '.join(FORMS)}")
 
 
 def check_order(order: str) -> None:
-    """Raise OptionError where ``order`` is no order of Euler angles: three axes, XYZ or xyz."""
+    """Raise OptionError unless ``order`` is an order of Euler angles: three axes, XYZ or xyz."""
     letters = order.lower()
     same_case = order in (letters, order.upper())
     apart = len(order) == 3 and letters[0] != letters[1] != letters[2]
@@ -62,8 +62,8 @@ def check_order(order: str) -> None:
 def from_matrices(matrices: Floats, form: str, order: str = "XYZ") -> Floats:
     """Matrices (n_frames, n, 3, 3) as ``form``, a key of ``FORMS``.
 
-    Quaternions have w first and keep their sign from frame to frame: of the first frame, and of
-    one after a gap, w >= 0. "6d" is the first column, then the second. Rotation vectors and Euler
+    Quaternions have w first and keep their sign from frame to frame: w >= 0 in the first frame and
+    after a break in time. "6d" is the first column, then the second. Rotation vectors and Euler
     angles are in radians.
     """
     if form == "matrix":
@@ -172,9 +172,9 @@ def _from_6d(flat: Floats) -> Floats:
 
 
 def continuous_signs(quaternions: Floats) -> Floats:
-    """Quaternions (n_frames, n, 4), w first, with the signs that keep neighbours near each other.
+    """Quaternions (n_frames, n, 4), w first, with the signs that keep neighbors near each other.
 
-    w >= 0 in the first frame and in each after a gap.
+    w >= 0 in the first frame and in each after a break in time.
     """
     if not len(quaternions):
         return quaternions
@@ -186,7 +186,7 @@ def continuous_signs(quaternions: Floats) -> Floats:
     fresh &= ~np.isnan(quaternions[..., 0])
     wrong = fresh & (signs * quaternions[..., 0] < 0)
     right = fresh & ~wrong
-    # From each fresh start on, what its own sign asks for holds up to the next one.
+    # The sign of each fresh start holds up to the next one.
     frames = np.arange(len(signs))[:, None]
     last_wrong = np.maximum.accumulate(np.where(wrong, frames, -1), axis=0)
     last_right = np.maximum.accumulate(np.where(right, frames, -1), axis=0)
@@ -255,7 +255,7 @@ def rotations(
 
 Quaternion = tuple[int, ...]  # four columns
 
-UNIT = 2e-3  # how far a norm may be from 1: of numbers with three decimals
+UNIT = 2e-3  # greatest deviation of a norm from 1: of numbers with three decimals
 SIZE = 4
 _NAMED = re.compile(r"(?i)quat|(^|[^a-z])q(_?[wxyz0-3])?($|[^a-z0-9])")
 HINT = "; components=True interpolates each column by itself"
@@ -266,8 +266,8 @@ def scalar_quaternions(
 ) -> list[Quaternion]:
     """The columns of quaternions: four plain scalars side by side whose norm is 1 in all rows.
 
-    Raises OptionError where these overlap and names do not tell which are meant, and where columns
-    that are named like a quaternion are none.
+    Raises OptionError where these overlap and names do not decide between them, and where columns
+    with the names of a quaternion have another norm.
     """
     names = _plain_names(skeleton, own)
     places = [at for at in range(len(names) - SIZE + 1) if None not in names[at : at + SIZE]]
@@ -287,13 +287,12 @@ def scalar_quaternions(
             apart.append(at)
         elif named.isdisjoint([at, *rivals]):
             raise OptionError(
-                f"{_describe_columns(names, at)} may be a quaternion, or those beside them{HINT}"
+                f"{_describe_columns(names, at)} may be a quaternion, or columns beside them{HINT}"
             )
     return [tuple(range(at, at + SIZE)) for at in apart]
 
 
 def _plain_names(skeleton: Skeleton | None, own: Sequence[Channel] | None) -> list[str | None]:
-    """The names of columns that are plain scalars, None for others."""
     if own is not None:
         return [channel.label for channel in own]
     joints = () if skeleton is None else skeleton.joints
@@ -305,7 +304,7 @@ def _plain_names(skeleton: Skeleton | None, own: Sequence[Channel] | None) -> li
 
 
 def _is_unit(four: Floats) -> bool | None:
-    """Tell whether norms are 1 in all rows; None where none is known, or all rows are the same."""
+    """Return whether all known norms are 1; None without any, or if all rows are the same."""
     norms = np.sqrt((four * four).sum(axis=1))
     known = norms[~np.isnan(norms)]
     if not len(known) or (four == four[:1]).all():

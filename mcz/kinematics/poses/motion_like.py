@@ -45,14 +45,14 @@ MotionLike = Motion | ClipLike
 
 
 def poses_of(skeleton: Skeleton) -> FramePoses:
-    """The poses of a skeleton; kernels are loaded then, not where poses are imported."""
+    """The poses of a skeleton; kernels are loaded on the first call."""
     from mcz.kinematics.frames import frame_poses_of
 
     return frame_poses_of(skeleton)
 
 
 def frame_range(moving: MotionLike, frames: Frames) -> tuple[int, int]:
-    """Frames a <= f < b, from a pair or a slice; raises OptionError where they are not there.
+    """Frames a <= f < b, from a pair or a slice; raises OptionError where they are out of range.
 
     A slice counts as numpy's do: ends may be left out, negative or beyond.
     """
@@ -68,7 +68,7 @@ def frame_range(moving: MotionLike, frames: Frames) -> tuple[int, int]:
 
 
 def joint_numbers(skeleton: Skeleton, joints: Joints) -> list[int]:
-    """The indices of these joints, of all where None; raises MotionError."""
+    """The indices of these joints, None: all; raises MotionError."""
     if joints is None:
         return list(range(skeleton.n_joints))
     return [skeleton.find(joint) for joint in joint_list(joints)]
@@ -77,8 +77,8 @@ def joint_numbers(skeleton: Skeleton, joints: Joints) -> list[int]:
 def values_of(moving: MotionLike, frames: tuple[int, int], joints: Sequence[int]) -> Floats:
     """The channels of these joints, float64 (n_frames, n_channels), NaN where invalid.
 
-    Columns of other joints may hold anything. Raises MotionError where the rows of the motion are
-    no poses, see ``check_poses``.
+    Columns of other joints are undefined. Raises MotionError where the rows of the motion are not
+    poses, see ``check_poses``.
     """
     skeleton = moving.skeleton
     check_poses(moving.name, moving.signals[0])
@@ -100,22 +100,22 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     """
     if unit is None:
         return 1.0
-    wanted = unit_cm_of(unit)
+    unit_cm = unit_cm_of(unit)
     if skeleton.unit_cm is None:
         raise OptionError(
             f"skeleton {skeleton.name!r}: its length unit is unknown, so it cannot be turned into "
             f"{unit}; leave unit= out, or say it when reading"
         )
-    return skeleton.unit_cm / wanted
+    return skeleton.unit_cm / unit_cm
 
 
 def times(moving: MotionLike, frames: Frames = None, *, signal: int | str = 0) -> Floats:
     """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
 
-    Those of a signal of times; else, by frame numbers and rate, from ``first_time`` on or, without
+    Times of a signal of times; else, by frame numbers and rate, from ``first_time`` on or, without
     one, (number - 1) / rate, so that frame 1 is at 0 s. Events are on the same clock. ``signal``,
-    by index or name: the times of its samples, which lie evenly from each frame on. ``frames``
-    (a, b) or a slice. Raises OptionError where neither times nor a rate are known.
+    by index or name: the times of its samples, evenly spaced from each frame on. ``frames`` (a, b)
+    or a slice. Raises OptionError where neither times nor a rate are known.
     """
     start, stop = frame_range(moving, frames)
     timeline = known_timeline(moving.name, moving.timeline)
@@ -135,7 +135,7 @@ def signal_of(moving: MotionLike, signal: int | str) -> Any:
 
 def as_type(values: Reals, dtype: DTypeLike) -> Reals:
     """``values`` as float64 or float32; raises OptionError for another type."""
-    wanted = np.dtype(dtype)
-    if wanted not in (np.float64, np.float32):
-        raise OptionError(f"dtype {wanted}: float64 or float32")
-    return values.astype(wanted, copy=False)
+    new_type = np.dtype(dtype)
+    if new_type not in (np.float64, np.float32):
+        raise OptionError(f"dtype {new_type}: float64 or float32")
+    return values.astype(new_type, copy=False)

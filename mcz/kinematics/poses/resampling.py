@@ -23,18 +23,18 @@ from mcz.model.clock import TIMES, Timeline, known_timeline
 from mcz.model.motion import Motion, Signal, Skeleton, frame_rate_of
 from mcz.model.types import Floats, Ints
 
-ALIGNED = 1e-6  # of a frame: a new frame so near to an old one falls upon it
-MOST_VALUES = 2**31  # of what is made: a rate of 1e9 would be a mistake, not a wish
+ALIGNED = 1e-6  # of a frame: a new frame so near to an old one coincides with it
+MOST_VALUES = 2**31  # limit of the result: a rate of 1e9 is a mistake
 
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """The new frames between the old: frame ``before`` and the next, and how far between, 0 to 1.
+    """The new frames between the old: frame ``before`` and the next, and the share between, 0 to 1.
 
-    ``before`` int64 (n,), ``share`` float64 (n,): 0 where a new frame falls upon an old one.
-    ``runs``, int64 (n, 2), are the first and last old frame without a gap between, None: all.
-    ``weights``, (2, n): the time between the two frames, divided by that from the frame before, and
-    to the frame after, None: of frames at equal distances, 1/2.
+    ``before`` int64 (n,), ``share`` float64 (n,): 0 where a new frame coincides with an old one.
+    ``runs``, int64 (n, 2), are the first and last old frame without a break in time, None: all.
+    ``weights``, (2, n): the time between the two frames, divided by the time from the frame before,
+    and to the frame after; None: equal distances, 1/2.
     """
 
     before: Ints
@@ -54,34 +54,33 @@ def resample(
 
     Joints of three rotations, a quaternion or a rotation vector turn the shortest way at a constant
     speed from frame to frame (slerp); one or two angles of a joint, and three about two axes, go
-    the shorter way round each. Positions, lengths and all else run along Catmull-Rom splines
-    through four frames. A frame that coincides with one of ``motion`` is that frame, bit for bit.
-    No filter is applied: at a lower rate what is faster than half of it folds back, as wherever
-    frames are left out. New frames lie between old ones by their times: a value between frames of
-    which one is unknown is unknown, and where frames are missing there are none in the result
-    either, whose frame numbers have the gap.
+    the shorter way round each. Positions, lengths and all other channels follow Catmull-Rom splines
+    through four frames. A frame that coincides with one of ``motion`` equals it bit for bit. No
+    filter is applied: at a lower rate, motion faster than half of it folds back (aliasing). New
+    frames lie between old ones by their times: a value between frames of which one is unknown is
+    unknown. Where frames are missing, the result has no frames either, and its frame numbers skip
+    them.
 
-    Four plain scalars side by side whose norm is 1 in every frame are a quaternion, too, and turn;
-    ``source-note`` of the result says so. OptionError where it is not clear which four are meant,
-    or where such that are named like a quaternion have another norm. ``components``: plain scalars
-    are splines, whatever they are.
+    Four plain scalars side by side whose norm is 1 in every frame are a quaternion too, and turn;
+    ``source-note`` of the result lists them. OptionError where these overlap, or where columns with
+    the names of a quaternion have another norm. ``components``: plain scalars are always splines.
 
     Other signals cannot follow: OptionError unless ``drop_signals``. The result has no source, and
     the times of the old. Raises OptionError where the times of ``motion`` are unknown, MotionError
-    for a ``rate`` that is none.
+    for a bad ``rate``.
     """
-    wanted = frame_rate_of(rate, motion.name)
+    new_rate = frame_rate_of(rate, motion.name)
     timeline, first = known_timeline(motion.name, motion.timeline), motion.signals[0]
     others = [signal.name for signal in motion.signals[1:] if signal.role != TIMES]
     if others and not drop_signals:
         raise OptionError(
-            f"signals beside the motion ({', '.join(others)}) are not "
+            f"signals other than the motion ({', '.join(others)}) are not "
             "resampled; leave them out with drop_signals=True",
             clip=motion.name,
         )
     if first.samples_per_frame > 1:
         raise MotionError("several samples a frame", clip=motion.name)
-    numbers, times = times_of(timeline, wanted, first)
+    numbers, times = times_of(timeline, new_rate, first)
     own = first.channels is not None
     old = np.asarray(motion.values, np.float64)
     values = resample_rows(None if own else motion.skeleton, old, times)
@@ -93,37 +92,36 @@ def resample(
             columns = ", ".join(f"{four[0] + 1} to {four[-1] + 1}" for four in quaternions)
             note = f"columns {columns} were resampled as quaternions"
             metadata["source-note"] = "; ".join(filter(None, (metadata.get("source-note"), note)))
-    new = timeline.even[:1] + numbers / float(wanted)
+    new = timeline.regular_times[:1] + numbers / float(new_rate)
     mask = ~np.isnan(values) if first.mask is not None else None
-    start = float(new[0] * float(wanted)) if len(new) else 0.0
+    start = float(new[0] * float(new_rate)) if len(new) else 0.0
     base = round(start) if abs(start) < 2**52 and abs(start - round(start)) < ALIGNED else 0
     counted = numbers + base + 1
     resampled_motion = replace(
         motion,
         signals=(replace(Signal(values, name=first.name, mask=mask), channels=first.channels),),
-        frame_rate=wanted,
+        frame_rate=new_rate,
         source=None,
         frame_numbers=None if (counted == np.arange(1, len(counted) + 1)).all() else counted,
         number_step=1,
         metadata=metadata,
     )
-    return resampled_motion.at_times(Timeline(new, wanted, timeline.rounding))
+    return resampled_motion.at_times(Timeline(new, new_rate, timeline.rounding))
 
 
-def times_of(timeline: Timeline, wanted: Fraction, signal: Signal) -> tuple[Ints, Times]:
-    """The frames at rate ``wanted`` that lie within the runs of ``timeline``, counted from 0 at its
-    first time, and where they lie.
+def times_of(timeline: Timeline, rate: Fraction, signal: Signal) -> tuple[Ints, Times]:
+    """The frames at ``rate`` within the runs of ``timeline``, and their places.
 
-    In exact arithmetic where times lie at whole multiples of 1 / rate. Raises OptionError where
-    they would be too many.
+    Counted from 0 at its first time, in exact arithmetic where times lie at whole multiples of 1 /
+    rate. Raises OptionError where they would be too many.
     """
     room = MOST_VALUES // max(1, signal.n_channels)
     parts: list[tuple[Ints, Times]] = []
     for run in timeline.runs:
-        frames, lie = frames_within(timeline, wanted, run)
+        frames, lie = frames_within(timeline, rate, run)
         room -= max(0, frames.stop - frames.start)  # too many for len()
         if room < 0:
-            raise too_many_frames_error(timeline, wanted)
+            raise too_many_frames_error(timeline, rate)
         parts.append((np.array(frames, np.int64), lie(frames)))
     if not parts:
         return np.empty(0, np.int64), Times(np.empty(0, np.int64), np.empty(0))
@@ -142,25 +140,25 @@ def times_of(timeline: Timeline, wanted: Fraction, signal: Signal) -> tuple[Ints
     return np.concatenate(numbers), times
 
 
-def too_many_frames_error(timeline: Timeline, wanted: Fraction) -> OptionError:
-    """The error that new frames are too many to be made."""
+def too_many_frames_error(timeline: Timeline, rate: Fraction) -> OptionError:
+    """The error for too many new frames."""
     since = timeline.times[-1] - timeline.times[0]
     return OptionError(
-        f"{len(timeline.times)} frames in {since:g} s make too many at {wanted} a second"
+        f"{len(timeline.times)} frames in {since:g} s make too many at {rate} a second"
     )
 
 
 def frames_within(
-    timeline: Timeline, wanted: Fraction, run: tuple[int, int]
+    timeline: Timeline, new_rate: Fraction, run: tuple[int, int]
 ) -> tuple[range, Callable[[range], Times]]:
     """New frames within a run of old ones, and a function that locates them."""
     start, stop = run
-    places, rate = timeline.places, timeline.rate
+    places, rate = timeline.ticks, timeline.rate
     if places is not None and rate and places[stop - 1] - places[start] == stop - start - 1:
-        step, first = rate / wanted, int(places[start])
+        step, first = rate / new_rate, int(places[start])
         frames = range(ceil(first / step), int((first + stop - start - 1) / step) + 1)
         return frames, lambda frames: _shift_times(times_at(frames, step), start - first)
-    since = (timeline.even[start:stop] - timeline.even[0]) * float(wanted)
+    since = (timeline.regular_times[start:stop] - timeline.regular_times[0]) * float(new_rate)
     frames = range(ceil(since[0] - ALIGNED), int(since[-1] + ALIGNED) + 1)
     return frames, lambda frames: _locate_frames(np.array(frames, np.float64), since, start)
 
@@ -188,11 +186,11 @@ def _locate_frames(frames: Floats, since: Floats, start: int) -> Times:
 MOST_FRAMES = 2**28
 
 
-def count_resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
-    """Number of frames at rate ``wanted``, from the first to at most the last."""
-    count = int((n_frames - 1) * wanted / rate) + 1 if n_frames else 0
+def count_resampled_frames(n_frames: int, rate: Fraction, new_rate: Fraction) -> int:
+    """Number of frames at rate ``new_rate``, from the first to at most the last."""
+    count = int((n_frames - 1) * new_rate / rate) + 1 if n_frames else 0
     if count > MOST_FRAMES:
-        raise OptionError(f"{count} frames at {float(wanted):g} a second are over {MOST_FRAMES}")
+        raise OptionError(f"{count} frames at {float(new_rate):g} a second are over {MOST_FRAMES}")
     return count
 
 
@@ -204,7 +202,7 @@ def times_at(frames: Iterable[int], step: Fraction) -> Times:
 
 
 def resample_rows(skeleton: Skeleton | None, old: Floats, times: Times) -> Floats:
-    """``resample`` of the rows of ``old``; ``skeleton`` None where channels are of no joint."""
+    """``resample`` of the rows of ``old``; ``skeleton`` None for channels without a joint."""
     if not times.share.any():
         return old[times.before]
     new = spline_rows(old, times)
@@ -227,7 +225,7 @@ def turn_scalars(quaternions: Sequence[Quaternion], old: Floats, new: Floats, ti
 
 
 def spline_rows(old: Floats, times: Times) -> Floats:
-    """Catmull-Rom splines through the rows of ``old``, straight on where a neighbour is missing."""
+    """Catmull-Rom splines through the rows of ``old``, straight where a neighbor is missing."""
     runs = times.runs
     low, high = (0, len(old) - 1) if runs is None else (runs[:, 0], runs[:, 1])
     p0, p1 = _rows(old, times.before - 1, low, high), old[times.before]
@@ -251,7 +249,7 @@ def _rows(old: Floats, frames: Ints, low: Ints | int, high: Ints | int) -> Float
 
 
 def _turn(chain: Chain, link: Link, old: Floats, new: Floats, times: Times) -> None:
-    """Fill the columns that turn a joint in the frames that are between frames."""
+    """Fill the columns that turn a joint in the frames between old frames."""
     between = np.flatnonzero(times.share > 0)
     before, after = times.before[between], times.after[between]
     share = times.share[between]
@@ -298,7 +296,7 @@ def _matrices(chain: Chain, link: Link, old: Floats) -> Floats:
 
 
 def _angles(turns: Floats, order: str, guess: Floats, full: float) -> Floats:
-    """The Euler angles of matrices (n, 3, 3), of all solutions those nearest to ``guess``."""
+    """The Euler angles of matrices (n, 3, 3), of all solutions the nearest to ``guess``."""
     angles = euler_angles(np.moveaxis(turns, 0, 2), order) * (full / (2 * np.pi))
     half = full / 2
     other = np.stack([angles[:, 0] + half, half - angles[:, 1], angles[:, 2] + half], axis=1)

@@ -1,7 +1,7 @@
 """Positions of points and the root, and their derivatives, from known positions only.
 
 ``places`` is (n_frames, n, 3), NaN where unknown; ``steps`` are the seconds from each frame to the
-next, (n_frames - 1,), NaN across a gap.
+next, (n_frames - 1,), NaN across a break in time.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from mcz.model.types import Floats, Reals
 def point_names(moving: MotionLike | Skeleton, joints: Joints = None) -> tuple[str, ...]:
     """The names of the points whose ``positions`` are given, in their order.
 
-    That is the name of the joint, with " end" where a point is an end site of a BVH. Of Acclaim a
-    joint's point is the end of its bone.
+    A name is the joint's, with " end" for an end site of a BVH. The point of an Acclaim joint is
+    the end of its bone.
     """
     skeleton = moving if isinstance(moving, Skeleton) else moving.skeleton
     names = names_of_points(skeleton)
@@ -46,20 +46,20 @@ def point_names(moving: MotionLike | Skeleton, joints: Joints = None) -> tuple[s
 def chosen_points(skeleton: Skeleton, joints: Joints) -> list[int]:
     """The points of these names, and the first point of each joint of these names or indices.
 
-    Raises MotionError where there is none.
+    Raises MotionError for an unknown one.
     """
     names = names_of_points(skeleton)
     if joints is None:
         return list(range(len(names)))
     firsts, points = first_points(skeleton), []
-    for wanted in joint_list(joints):
-        if isinstance(wanted, str) and wanted in names and wanted not in skeleton.addresses():
-            points.append(names.index(wanted))  # an end site
+    for joint in joint_list(joints):
+        if isinstance(joint, str) and joint in names and joint not in skeleton.addresses():
+            points.append(names.index(joint))  # an end site
             continue
         try:
-            points.append(firsts[skeleton.find(wanted)])
+            points.append(firsts[skeleton.find(joint)])
         except MotionError:
-            raise MotionError(f"no point {wanted!r} among {among(names, wanted)}") from None
+            raise MotionError(f"no point {joint!r} among {among(names, joint)}") from None
     return points
 
 
@@ -73,11 +73,11 @@ def positions(
 ) -> Reals:
     """World positions of the points of a Motion or Clip, (n_frames, n_points, 3).
 
-    ``joints`` by index or name, or points by the names of ``point_names``; None: all points, those
-    of ``point_names``. ``frames`` (a, b) or a slice. In length units of the skeleton, or in
-    ``unit``: "mm", "cm", "m", "in", "ft". A point that depends on an invalid value is NaN.
-    Raises OptionError, and MotionError where the skeleton has no kinematics: its angle unit is
-    unknown, or all of its channels are plain scalars.
+    ``joints`` by index or name, or points by the names of ``point_names``; None: all points of
+    ``point_names``. ``frames`` (a, b) or a slice. In length units of the skeleton, or in ``unit``:
+    "mm", "cm", "m", "in", "ft". A point that depends on an invalid value is NaN. Raises
+    OptionError, and MotionError where the skeleton has no kinematics: its angle unit is unknown, or
+    all of its channels are plain scalars.
     """
     scale = scale_to(moving.skeleton, unit)
     places = _positions(moving, joints, frame_range(moving, frames))
@@ -102,9 +102,9 @@ def velocities(
     """Velocities of the points, (n_frames, n_points, 3), in length units (or ``unit``) per second.
 
     Central differences by the times of the frames, (p[t+1] - p[t-1]) / 2 x rate where these are
-    uniform; one-sided at the ends of the clip, beside unknown positions and beside missing frames,
-    over which no difference is taken: a frame alone between two gaps has none, NaN. A part of the
-    frames has the numbers of the whole. Arguments and errors are those of ``positions``;
+    uniform; one-sided at the ends of the clip, next to unknown positions and next to breaks in
+    time, over which no difference is taken: a frame alone between two breaks has NaN. A part of the
+    frames has the same results as the whole. Arguments and errors are those of ``positions``;
     OptionError also where the times are unknown.
     """
     window = _read_window(moving, joints, frames, unit, 1)
@@ -121,8 +121,9 @@ def accelerations(
 ) -> Reals:
     """Accelerations of the points, in length units (or ``unit``) per second squared.
 
-    (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or beside a gap that of
-    the frame next to it, NaN in a run of fewer than three. Otherwise as ``velocities``.
+    (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or next to a break in
+    time the value of the neighbor frame, NaN in a run of fewer than three. Otherwise as
+    ``velocities``.
     """
     window = _read_window(moving, joints, frames, unit, 2)
     return as_type(_cut_window(accelerations_of(window.places, window.steps), window), dtype)
@@ -130,9 +131,9 @@ def accelerations(
 
 @dataclass(frozen=True, slots=True)
 class _Window:
-    """Places of some frames and of those around them; ``first`` and ``stop`` among ``places``.
+    """Positions of some frames and their neighbors; ``first`` and ``stop`` among ``places``.
 
-    ``steps`` are the seconds from each of them to the next, NaN across a gap.
+    ``steps`` are the seconds from each of them to the next, NaN across a break in time.
     """
 
     places: Floats
@@ -160,9 +161,9 @@ def _cut_window(values: Floats, near: _Window) -> Floats:
 class Root:
     """Position and rotation of the root in every frame.
 
-    ``positions`` (n_frames, 3) in length units (or the unit that was asked for), ``rotations``
-    (n_frames, 4), quaternions in the world, w first, ``joint`` its name, ``up_axis`` "x" to
-    "-z", or "" while unknown.
+    ``positions`` (n_frames, 3) in length units (or the requested unit), ``rotations`` (n_frames,
+    4), quaternions in the world, w first, ``joint`` its name, ``up_axis`` "x" to "-z", or "" while
+    unknown.
     """
 
     joint: str
@@ -177,7 +178,7 @@ class Root:
         """Rotation of the root about the up axis, (n_frames,), in radians.
 
         0 in the rest pose, continuous over turns: the twist of the rotation. Raises OptionError
-        where nobody says what is up.
+        where the up axis is unknown.
         """
         if not self.up_axis:
             raise OptionError(f"root {self.joint!r}: the axis that points up is unknown (up=)")
@@ -200,8 +201,8 @@ def root(
 ) -> Root:
     """World position and rotation of the root joint.
 
-    ``joint`` is another than the first. Raises as ``positions``, and MotionError where the skeleton
-    has no joint.
+    ``joint`` selects another than the first. Raises as ``positions``, and MotionError where the
+    skeleton has no joint.
     """
     skeleton, span = moving.skeleton, frame_range(moving, frames)
     scale = scale_to(skeleton, unit)
@@ -218,7 +219,7 @@ def root(
 
 
 def velocities_of(places: Floats, steps: Floats) -> Floats:
-    """The slope of the parabola through three frames, at an end or beside a gap that to the next.
+    """The slope of the parabola through three frames; at an end or break, to the next frame.
 
     NaN where a frame or both of its neighbors are unknown.
     """
@@ -230,9 +231,9 @@ def velocities_of(places: Floats, steps: Floats) -> Floats:
 
 
 def accelerations_of(places: Floats, steps: Floats) -> Floats:
-    """Second derivative of that parabola; at an end or beside a gap that of the next frame.
+    """Second derivative of that parabola; at an end or a break in time, the next frame's.
 
-    NaN where a frame is unknown or stands in a run of fewer than three.
+    NaN where a frame is unknown or in a run of fewer than three.
     """
     before, after, first, last = _one_sided_slopes(places, steps)
     with np.errstate(invalid="ignore"):

@@ -1,11 +1,11 @@
 """Maps of joints between usual skeletons, by the part of the body that each joint turns.
 
-Parts are called as SMPL calls its joints. Joints of one part turn alike: rotations of clips that
-are there as AMC and as BVH were compared. ``lwrist``, which CMU's BVH files call LeftHand, turns
-what ``left_wrist`` does; ``abdomen`` of the Daz-friendly files turns with ``upperback``.
+Parts have the names of SMPL's joints. Joints of one part turn alike: rotations of clips that exist
+as AMC and as BVH were compared. ``lwrist``, LeftHand in CMU's BVH files, turns the part of
+``left_wrist``; ``abdomen`` of the Daz-friendly files turns with ``upperback``.
 
 ``{s}``, ``{S}``, ``{side}`` and ``{Side}`` stand for a side: l, L, left, Left and their likes. Of
-several names, divided by a bar, files have one or the other.
+several names, divided by a bar, a file has one.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow")  # parts of a side
 
 
 def joint_map(a: str | Skeleton, b: str | Skeleton) -> dict[str, str]:
-    """From joint names of ``a`` to those of ``b``, of joints that turn the same part of the body.
+    """From joint names of ``a`` to joint names of ``b`` that turn the same part of the body.
 
     Each is the name of a usual skeleton or a Skeleton with the names of one: "cmu-amc" (also its
     ASF), "cmu-bvh" (cgspeed's MotionBuilder-friendly files), "cmu-bvh-3dsmax", "cmu-bvh-daz",
-    "humanml3d-22", "smpl-24" (SMPL), "smplh-52" (SMPL-H). What the other has no counterpart of is
-    left out. ``joint_map(a, a)`` lists the names of a skeleton, those of SMPL in its order.
+    "humanml3d-22", "smpl-24" (SMPL), "smplh-52" (SMPL-H). Joints without a counterpart are left
+    out. ``joint_map(a, a)`` lists the names of a skeleton, SMPL's in its order.
 
-    Raises OptionError for a name or a Skeleton that is none of these.
+    Raises OptionError for an unknown name or Skeleton.
     """
     ours, theirs = _joints(a), _joints(b)
     return {name: theirs[part] for part, name in ours.items() if part in theirs}
@@ -44,20 +44,22 @@ def _joints(known: str | Skeleton) -> dict[str, str]:
 
 
 def _recognize_joints(skeleton: Skeleton) -> dict[str, str]:
-    """The joints of ``skeleton`` as of the usual one that it has most joints of.
+    """The joints of ``skeleton`` by part, from the usual skeleton that shares most joints with it.
 
-    It has to have all of the body's; fingers, eyes and the like may be missing. Of SMPL's, which
-    differ in little else, all.
+    All of the body's joints are required; fingers, eyes and the like may be missing. Of SMPL's
+    skeletons, which differ in little else, all joints are required.
     """
-    held = set(skeleton.joint_names)
+    joint_names = set(skeleton.joint_names)
     best: dict[str, str] = {}
     for kind, joints in SKELETONS.items():
-        found = {
-            part: present[0] for part, names in joints.items() if (present := _in(names, held))
+        matches = {
+            part: present[0]
+            for part, names in joints.items()
+            if (present := _in(names, joint_names))
         }
         needed = set(joints) if not kind.startswith("cmu") else set(joints) & set(SMPL_BODY)
-        if needed <= set(found) and len(found) > len(best):
-            best = found
+        if needed <= set(matches) and len(matches) > len(best):
+            best = matches
     if not best:
         raise OptionError(
             f"joint_map: skeleton {skeleton.name!r} has the joint names of none of "
@@ -67,7 +69,7 @@ def _recognize_joints(skeleton: Skeleton) -> dict[str, str]:
 
 
 def limbs_of(skeleton: Skeleton) -> set[str]:
-    """The names of the joints of thighs, shins, feet and arms, of a usual skeleton; else none."""
+    """The joints of thighs, shins, feet and arms of a usual skeleton; empty for another."""
     try:
         known = _recognize_joints(skeleton)
     except OptionError:
@@ -75,8 +77,8 @@ def limbs_of(skeleton: Skeleton) -> set[str]:
     return {name for part, name in known.items() if part.partition("_")[2] in LIMBS}
 
 
-def _in(names: tuple[str, ...], held: set[str]) -> list[str]:
-    return [name for name in names if name in held]
+def _in(names: tuple[str, ...], joint_names: set[str]) -> list[str]:
+    return [name for name in names if name in joint_names]
 
 
 SMPL_BODY = (
@@ -185,7 +187,7 @@ CMU_BVH_DAZ = {
 
 
 def _both_sides(rows: dict[str, str]) -> dict[str, tuple[str, ...]]:
-    """The rows with a row for each side where they speak of one."""
+    """The rows, with a row for each side where they have placeholders of sides."""
     made: dict[str, tuple[str, ...]] = {}
     for side in ("left", "right"):
         words = {"side": side, "Side": side.title(), "s": side[0], "S": side[0].upper()}

@@ -19,8 +19,8 @@ def match_joints(
 ) -> dict[int, int]:
     """The joints of ``source``, by the joint of ``target`` that each turns, in joint order.
 
-    ``joint_map`` maps names of the source to names of the target; None: the same names, of which
-    all that turn have to be in both. Raises OptionError, which names the joint.
+    ``joint_map`` maps names of the source to names of the target; None: equal names, and both must
+    have all turning joints. Raises OptionError, which names the joint.
     """
     ours, theirs = target.joint_names, source.joint_names
     if joint_map is None:
@@ -50,7 +50,6 @@ def match_joints(
 
 
 def _check_names(source: Skeleton, target: Skeleton) -> None:
-    """Every joint that turns in one is in the other."""
     for one, other, where in ((source, target, "skeleton"), (target, source, "motion")):
         known = set(other.joint_names)
         for name, joint in zip(one.joint_names, one.joints, strict=True):
@@ -62,7 +61,7 @@ def _check_names(source: Skeleton, target: Skeleton) -> None:
 
 
 def nearest_above(skeleton: Skeleton, joint: int, chosen: Mapping[int, int]) -> int:
-    """The nearest joint above ``joint`` that is in ``chosen``, -1 where there is none."""
+    """The nearest ancestor of ``joint`` in ``chosen``, -1 if there is none."""
     parent = skeleton.joints[joint].parent
     while parent >= 0 and parent not in chosen:
         parent = skeleton.joints[parent].parent
@@ -83,13 +82,15 @@ def moves(channels: tuple[Channel, ...]) -> bool:
 
 
 def check_channels(motion: Motion) -> None:
-    """Raise MotionError where the motion's channels are not those of its joints."""
+    """Raise MotionError where the motion's channels differ from those of its joints."""
     if not motion.signals[0].has_poses:
-        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
+        raise MotionError(
+            "the channels of its motion signal differ from those of its skeleton", clip=motion.name
+        )
 
 
 def replace_motion(motion: Motion, skeleton: Skeleton, signal: Signal) -> Motion:
-    """``motion`` of another skeleton and signal, without the source file that it no longer is."""
+    """``motion`` with another skeleton and signal, without its source file."""
     made = replace(motion, skeleton=skeleton, signals=(signal, *motion.signals[1:]), source=None)
     return made.at_times(motion.timeline)
 

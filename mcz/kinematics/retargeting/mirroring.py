@@ -1,8 +1,8 @@
 """A motion in the mirror: left and right change places.
 
-With S the reflection, a joint with axes W becomes its counterpart with axes S W S. A reflected
-turn about one of the mirror's own axes is a turn about the same axis, one about any other axis has
-the other sign. So numbers change places and signs, and nothing else.
+With S the reflection, a joint with axes W becomes its counterpart with axes S W S. A reflected turn
+about one of the mirror's own axes is a turn about the same axis, a turn about any other axis
+changes its sign. So only places and signs of numbers change.
 """
 
 from __future__ import annotations
@@ -34,18 +34,17 @@ AXES = ("x", "y", "z")
 def mirror(motion: Motion, axis: str = "x", pairs: Mapping[str, str] | None = None) -> Motion:
     """``motion`` reflected through the plane normal to ``axis`` of the world, at its origin.
 
-    ``axis`` is "x", "y" or "z": the one from side to side. Left and right joints change places: of
-    each the positions are exactly the mirrored ones of its counterpart. So its bones are as long
-    as the counterpart's were, and its channels are the counterpart's. Names, order and parents are
-    kept. Numbers stay on their grids.
+    ``axis`` is "x", "y" or "z", from side to side. Left and right joints change places: the
+    positions of each are exactly the mirrored ones of its counterpart, and so are the lengths of
+    its bones and its channels. Names, order and parents are kept. Numbers stay on their grids.
 
-    Counterparts are found by name, as "LeftArm" and "RightArm", "lfemur" and "rfemur", "Hand_L"
-    and "Hand_R" are; what says no side is its own. ``pairs`` maps names to names where they do not
-    say it. What is returned has no source.
+    Counterparts are found by name, such as "LeftArm" and "RightArm", "lfemur" and "rfemur",
+    "Hand_L" and "Hand_R"; a joint without a side is its own. ``pairs`` maps names to names where
+    they do not show it. The result has no source.
 
-    Raises OptionError for a side without counterpart, for pairs that hang on joints that are none,
-    and for another axis. Raises MotionError for plain scalars and for signals beside the motion,
-    of which is not known how they look in a mirror.
+    Raises OptionError for a side without counterpart, for a pair whose parents are not a pair, and
+    for another axis. Raises MotionError for plain scalars and for signals other than the motion,
+    whose mirror image is unknown.
     """
     if axis not in AXES:
         raise OptionError(f"mirror: axis {axis!r} is not one of {', '.join(AXES)}")
@@ -114,7 +113,7 @@ def _reflected_vector(vector: Vector, axis: str) -> Vector:
 
 
 def _turned_about(signal: Signal, skeleton: Skeleton, axis: str) -> Signal:
-    """The signal with the other sign where a mirror changes it."""
+    """The signal with changed signs where a mirror changes them."""
     flipped = np.array([_flips(c.kind, axis) for c in skeleton.channels], np.bool_)
     # 0 - v rather than -v: no zero becomes -0, which other grids lack.
     values = np.where(flipped, 0 - signal.values, signal.values)
@@ -122,20 +121,19 @@ def _turned_about(signal: Signal, skeleton: Skeleton, axis: str) -> Signal:
         signal,
         values=values,
         stored=values if signal.scaling is None else signal.scaling.stored(values, signal.stored),
-        exceptions=_without(signal.exceptions, flipped),
+        exceptions=_unchanged_exceptions(signal.exceptions, flipped),
         ordinals=None,
     )
 
 
 def _flips(kind: str, axis: str) -> bool:
-    """Return True if a channel of this kind changes its sign."""
     if kind in POSITION_KINDS:
         return kind[1] == axis
     return kind in TURNING_KINDS and kind != "qw" and kind[1] != axis
 
 
-def _without(exceptions: Exceptions, flipped: Bools) -> Exceptions:
-    """The texts of those numbers that are as they were."""
+def _unchanged_exceptions(exceptions: Exceptions, flipped: Bools) -> Exceptions:
+    """The texts of the numbers that did not change."""
     at = np.arange(len(flipped))
     at[flipped] = -1
     return exceptions.moved(at)

@@ -18,13 +18,13 @@ Named = TypeVar("Named", Motion, Skeleton)
 
 
 def rename(named: Named, mapping: Mapping[str, str]) -> Named:
-    """A motion or skeleton whose joints are called as ``mapping`` says, from old name to new.
+    """Rename the joints of a motion or skeleton by ``mapping``, from old name to new.
 
-    Joints that it does not name keep theirs; where a name repeats, ``name#1`` is the second joint
-    of that name, as in ``Skeleton.joint_names``. Numbers stay as they are. What is returned has no
-    source: a file's text has the old names. Other signals keep the names of their channels.
+    Other joints keep their names; where a name repeats, ``name#1`` is the second joint of that
+    name, as in ``Skeleton.joint_names``. Numbers stay unchanged. The result has no source: a file's
+    text has the old names. Other signals keep the names of their channels.
 
-    Raises OptionError for a joint that is not there, and for a name that two joints would have.
+    Raises OptionError for an unknown joint, and for a name that two joints would have.
     """
     skeleton = named if isinstance(named, Skeleton) else named.skeleton
     names = _names(skeleton, mapping)
@@ -45,16 +45,18 @@ def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
         if old not in addresses:
             raise OptionError(f"rename: no joint {old!r} among {among(addresses, old)}")
         if not isinstance(new, str) or not new:
-            raise OptionError(f"rename: {new!r} is no name for joint {old!r}")
+            raise OptionError(f"rename: {new!r} is not a valid name for joint {old!r}")
         index = addresses.index(old)
         names[index] = new
         given.add(index)
     for index in sorted(given):
         if names.count(names[index]) > 1:
-            held = [addresses[k] for k, name in enumerate(names) if name == names[index]]
+            addresses_of_name = [
+                addresses[k] for k, name in enumerate(names) if name == names[index]
+            ]
             raise OptionError(
-                f"rename: {names[index]!r} would be the name of {len(held)} joints: "
-                f"{', '.join(held)}"
+                f"rename: {names[index]!r} would be the name of {len(addresses_of_name)} joints: "
+                f"{', '.join(addresses_of_name)}"
             )
     return names
 
@@ -63,23 +65,22 @@ Given = TypeVar("Given", Motion, Skeleton)
 
 
 def with_offsets(given: Given, offsets: ArrayLike, unit_cm: float | None = None) -> Given:
-    """A motion or skeleton with these rest offsets, (n_joints, 3), and ``unit_cm`` where given.
+    """A motion or skeleton with these rest offsets, (n_joints, 3), and ``unit_cm`` if given.
 
-    They lead from each parent's origin to the joint's own, along axes that are those of the world
-    at rest. Numbers stay as they are, bones get other lengths, and so all joints other places.
-    What is returned has no source. Raises OptionError where the shape is another, or a number is
-    not finite.
+    They lead from each parent's origin to the joint's own, along the world's axes at rest. Numbers
+    stay unchanged; lengths of bones and so positions of joints change. The result has no source.
+    Raises OptionError for another shape, or a number that is not finite.
     """
     skeleton = given if isinstance(given, Skeleton) else given.skeleton
-    found = np.asarray(offsets, np.float64)
-    if found.shape != (skeleton.n_joints, 3) or not np.isfinite(found).all():
+    new_offsets = np.asarray(offsets, np.float64)
+    if new_offsets.shape != (skeleton.n_joints, 3) or not np.isfinite(new_offsets).all():
         raise OptionError(
-            f"offsets of shape {found.shape} for {skeleton.n_joints} joints: "
+            f"offsets of shape {new_offsets.shape} for {skeleton.n_joints} joints: "
             f"({skeleton.n_joints}, 3) finite numbers are wanted"
         )
     joints = tuple(
         replace(joint, offset=(x, y, z))
-        for joint, (x, y, z) in zip(skeleton.joints, found.tolist(), strict=True)
+        for joint, (x, y, z) in zip(skeleton.joints, new_offsets.tolist(), strict=True)
     )
     unit = skeleton.unit_cm if unit_cm is None else unit_cm
     made = replace(skeleton, joints=joints, unit_cm=unit, base=None, source=None)

@@ -17,7 +17,7 @@ from mcz.model.motion import Skeleton
 from mcz.model.text_format import among
 from mcz.model.types import Floats
 
-SHORT = 1e-9  # of the longest bone: no direction
+SHORT = 1e-9  # of the longest bone: shorter ones have no direction
 UNLIKE = 10.0  # degrees between bones at rest: more than people differ
 MOST_NAMED = 6
 
@@ -27,9 +27,9 @@ def rest_turns(
 ) -> dict[int, Floats]:
     """Turns of each joint of ``pairs``, and of -1, that align its bone with the source's.
 
-    Rotation matrices (3, 3, 1): for joints named in ``alike`` the least turn that does it, for
-    others that of the joint above, for -1 none. The bone of a joint leads to the one joint of
-    ``pairs`` that hangs on it or, where none does, along its first tail.
+    Rotation matrices (3, 3, 1): for joints named in ``alike`` the least such turn, for others the
+    turn of the joint above, for -1 none. The bone of a joint leads to the only joint of ``pairs``
+    below it or, if there is none, along its first tail.
 
     Raises OptionError for a joint that is not in ``pairs``, and for one without such a bone.
     """
@@ -52,7 +52,7 @@ def rest_turns(
 def _bone_turns(
     target: Skeleton, source: Skeleton, pairs: Mapping[int, int]
 ) -> dict[int, Floats | None]:
-    """The turn of each joint's bone to the source's, None where it has none.
+    """The turn of each joint's bone to the source's, None if it has none.
 
     Joints of several bones are left out.
     """
@@ -60,45 +60,46 @@ def _bone_turns(
     children: dict[int, list[int]] = {joint: [] for joint in (-1, *pairs)}
     for joint in pairs:
         children[nearest_above(target, joint, pairs)].append(joint)
-    found: dict[int, Floats | None] = {}
+    turns: dict[int, Floats | None] = {}
     for joint, other in pairs.items():
         below = children[joint]
         if len(below) == 1:
             bones = ours[below[0]] - ours[joint], theirs[pairs[below[0]]] - theirs[other]
-            found[joint] = _least_turn(*bones)
+            turns[joint] = _least_turn(*bones)
         elif not below:
-            found[joint] = _least_turn(_tail(target, joint), _tail(source, other))
-    return found
+            turns[joint] = _least_turn(_tail(target, joint), _tail(source, other))
+    return turns
 
 
 def _angle(turn: Floats | None) -> float:
-    """The degrees of a turn, 0 where there is none."""
     cosine = 1.0 if turn is None else (float(np.trace(turn)) - 1) / 2
     return math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
 
 
 def usual_alike(target: Skeleton, source: Skeleton, pairs: Mapping[int, int]) -> list[str]:
-    """The limbs of a usual skeleton, where one of them rests otherwise than the source's.
+    """The limbs of a usual skeleton, if one of them rests otherwise than the source's.
 
-    All of them, for what is not named turns along with the joint above. Warns with SkeletonWarning
-    of other skeletons whose bones rest otherwise.
+    All of them, since joints that are not named turn along with the joint above. Warns with
+    SkeletonWarning for other skeletons whose bones rest otherwise.
     """
     names, others = target.joint_names, source.joint_names
     ours, theirs = limbs_of(target), limbs_of(source)
     turns = _bone_turns(target, source, pairs)
-    found = {joint: angle for joint, turn in turns.items() if (angle := _angle(turn)) > UNLIKE}
+    angles = {joint: angle for joint, turn in turns.items() if (angle := _angle(turn)) > UNLIKE}
     known = [joint for joint, turn in turns.items() if turn is not None]
     limbs = [j for j in known if names[j] in ours or others[pairs[j]] in theirs]
-    if found and not (ours or theirs):
-        said = ", ".join(f"{names[j]} by {found[j]:.0f} degrees" for j in list(found)[:MOST_NAMED])
-        more = " ..." if len(found) > MOST_NAMED else ""
+    if angles and not (ours or theirs):
+        listed = ", ".join(
+            f"{names[j]} by {angles[j]:.0f} degrees" for j in list(angles)[:MOST_NAMED]
+        )
+        more = " ..." if len(angles) > MOST_NAMED else ""
         warnings.warn(
-            f"retarget: bones of the rest poses differ: {said}{more}; match_rest= names those that "
-            "are to point as the motion's, () accepts the difference",
+            f"retarget: bones of the rest poses differ: {listed}{more}; match_rest= names those "
+            "that are to point as the motion's, () accepts the difference",
             SkeletonWarning,
             stacklevel=3,
         )
-    return [names[joint] for joint in limbs] if found.keys() & set(limbs) else []
+    return [names[joint] for joint in limbs] if angles.keys() & set(limbs) else []
 
 
 def _numbers(target: Skeleton, pairs: Mapping[int, int], alike: Iterable[str]) -> set[int]:
@@ -121,7 +122,7 @@ def _tail(skeleton: Skeleton, joint: int) -> Floats:
 def _least_turn(a: Floats, b: Floats) -> Floats | None:
     """The rotation by the least angle that makes ``a`` point along ``b``; None without direction.
 
-    Where they are opposite, about an axis normal to both, whichever.
+    For opposite vectors it is about any axis normal to both.
     """
     lengths = np.linalg.norm(a), np.linalg.norm(b)
     if min(lengths) <= SHORT * max(lengths):

@@ -1,8 +1,8 @@
 """A motion on another skeleton: the same turns of joints, on bones of other lengths.
 
 With W a joint's rotation in the world, the identity at rest, each joint of the target has the W of
-the joint that stands for it. What the channels of a joint cannot make of that they make as nearly
-as they can, and joints below make up for it.
+its counterpart. If its channels cannot, it comes as near as they can, and joints below correct the
+rest.
 """
 
 from __future__ import annotations
@@ -27,7 +27,13 @@ from mcz.kinematics.retargeting.matching import (
     replace_motion,
 )
 from mcz.kinematics.retargeting.rest_poses import rest_turns, usual_alike
-from mcz.kinematics.retargeting.turns import back, finite, local_turns, relative, set_local_turns
+from mcz.kinematics.retargeting.turns import (
+    finite_frames,
+    inverse,
+    local_turns,
+    relative_turns,
+    set_local_turns,
+)
 from mcz.kinematics.targets import Targets
 from mcz.model.motion import POSITION_KINDS, Motion, Skeleton
 from mcz.model.types import Floats
@@ -46,26 +52,26 @@ def retarget(
     """``motion`` on ``skeleton``: its joints turn as the same joints of the motion do.
 
     ``joint_map`` maps names of the motion's joints to names of ``skeleton``, as ``mcz.joint_map``
-    gives them; joints that it leaves out stay at rest, or are left out. None: the same names.
+    returns them; joints without an entry stay at rest, or are left out. None: the same names.
 
-    Turns are turns from rest. Where the rest poses are unlike, one with arms down and one with
-    arms out, so would be the poses. ``match_rest`` names joints of ``skeleton`` whose bones are to
-    point as those of the motion do, such as upper arms and forearms; joints below them turn along.
-    "auto": the arms and legs of usual skeletons (see ``mcz.joint_map``) that rest otherwise; of
-    others a SkeletonWarning names the bones that do. (): none.
+    Turns are turns from rest. If the rest poses differ, one with arms down and one with arms out,
+    the poses would differ too. ``match_rest`` names joints of ``skeleton`` whose bones shall point
+    as the motion's do, such as upper arms and forearms; joints below them turn along. "auto": the
+    arms and legs of usual skeletons (see ``mcz.joint_map``) that rest otherwise; for other
+    skeletons a SkeletonWarning names such bones. (): none.
 
-    The root's way is scaled by ``scale``, in length units of ``skeleton`` per length unit of the
-    motion. None: by the length of the legs, from hip to foot, or of all bones where no foot has
-    its name. Position channels of other joints keep what they add to the rest pose, scaled alike,
-    where both joints have such; what else stretches bones of the motion is left out.
+    The root's path is scaled by ``scale``, in length units of ``skeleton`` per length unit of the
+    motion. None: by the length of the legs, from hip to foot, or of all bones if no foot is found
+    by name. Position channels of other joints keep their difference from the rest pose, scaled
+    alike, if both joints have them; other stretching of bones is left out.
 
     Values are on a grid of 6 decimals. Frame rate, frame numbers, name, metadata and further
     signals are kept; there is no source.
 
-    Raises OptionError for joints that are not there, for two that stand for one, for one of
-    ``match_rest`` without a bone, for up axes that differ, for a scale that is not above 0, and
-    where no joint could follow the root's way.
-    Raises MotionError where one of the skeletons has no kinematics or markers alone.
+    Raises OptionError for unknown joints, for two with one counterpart, for one of ``match_rest``
+    without a bone, for up axes that differ, for a scale that is not above 0, and if no joint could
+    follow the root's path. Raises MotionError where one of the skeletons has no kinematics or
+    markers alone.
     """
     check_channels(motion)
     source = motion.skeleton
@@ -118,25 +124,26 @@ class _Retargeted:
         self.travel = Travel(source, target, pairs, scale, values, origins_of(source, values))
 
     def values(self) -> Floats:
-        """Values (n_frames, n_channels), NaN where what they stand for is not known."""
-        missed: dict[int, Floats] = {-1: IDENTITY}  # of what is wanted, along the joint's own axes
+        """Values (n_frames, n_channels), NaN where their source is unknown."""
+        # rotations still missing, along the joint's own axes
+        missed: dict[int, Floats] = {-1: IDENTITY}
         for joint, other in self.pairs.items():
             above = nearest_above(self.target, joint, self.pairs)
             there = self.pairs[above] if above >= 0 else -1
-            turn = relative(self.theirs, there, other, self.turns)
+            turn = relative_turns(self.theirs, there, other, self.turns)
             turn = multiply_matrices(
-                multiply_matrices(back(self.rest[above]), turn), self.rest[joint]
+                multiply_matrices(inverse(self.rest[above]), turn), self.rest[joint]
             )
-            wanted = multiply_matrices(missed[above], turn)
-            made = set_local_turns(self.ours, joint, wanted, self.columns)
-            missed[joint] = _known(multiply_matrices(back(made), wanted))
+            target = multiply_matrices(missed[above], turn)
+            made = set_local_turns(self.ours, joint, target, self.columns)
+            missed[joint] = _known(multiply_matrices(inverse(made), target))
         self.travel.set(self.columns, self.rest)
         return np.ascontiguousarray(self.columns.T)
 
 
 def _known(turn: Floats) -> Floats:
-    """The same, the identity where it is not known: joints below are known by themselves."""
-    known = finite(turn)
+    """The same, the identity where unknown: joints below are known independently."""
+    known = finite_frames(turn)
     return turn if known.all() else np.where(known, turn, IDENTITY)
 
 
@@ -144,9 +151,9 @@ def size_ratio(ours: Skeleton, theirs: Skeleton, pairs: Mapping[int, int]) -> fl
     """Our size for each unit of theirs, each in its own length units.
 
     ``pairs`` has joints of theirs by joints of ours. Heights are from the feet up to the joint
-    where the legs part, as ``_height`` says; a foot is the first joint of a leg that is a part of
-    a foot by its name, in either skeleton. Where there is none, or it has no height, the length of
-    all bones between joints of ``pairs`` counts; 1 where there is none of these, too.
+    where the legs part, see ``_height``; a foot is the first joint of a leg that is a part of a
+    foot by its name, in either skeleton. Without feet or heights the length of all bones between
+    joints of ``pairs`` counts; 1 without these too.
     """
     feet = {
         one: other
@@ -163,9 +170,9 @@ def size_ratio(ours: Skeleton, theirs: Skeleton, pairs: Mapping[int, int]) -> fl
 def _height(skeleton: Skeleton, feet: list[int]) -> float:
     """The height of the joint where the legs part above the feet, with legs straight.
 
-    Up is away from the feet in the rest pose; one leg alone parts at its root. A leg begins below
-    the first bone that has a length; of that bone counts how far it leads down. The mean of all
-    legs; 0 where there is none.
+    Up is away from the feet in the rest pose; a single leg parts at its root. A leg begins below
+    the first bone with a length; of that bone only its descent counts. The mean of all legs; 0 if
+    there is none.
     """
     if not feet:
         return 0.0
@@ -208,7 +215,7 @@ def _lengths(skeleton: Skeleton) -> Floats:
     return np.asarray(np.sqrt((skeleton.offsets**2).sum(axis=1)))
 
 
-ROUNDING = 1e-9  # of the skeleton's reach: no way at all
+ROUNDING = 1e-9  # of the skeleton's reach: shorter paths count as none
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,9 +236,9 @@ class Travel:
     def set(self, columns: Floats, rest: Mapping[int, Floats]) -> None:
         """Write all position channels of the target into ``columns``, (n_channels, F).
 
-        ``rest`` has, of each joint of ``pairs`` and of -1, what its rest pose is turned by.
+        ``rest`` has the turn of the rest pose of each joint of ``pairs`` and of -1.
         """
-        ways: dict[int, Floats] = {}  # of joints, from where they are at rest on their parent
+        ways: dict[int, Floats] = {}  # of joints, from their rest position on their parent
         for joint, other in self.pairs.items():
             above = nearest_above(self.target, joint, self.pairs)
             if above < 0:
@@ -240,16 +247,16 @@ class Travel:
                     ways[carrier] = self._way(joint, other)
             elif moves(self.target.joints[joint].channels):
                 step = self.scale * self._step(other)
-                ways[joint] = to_world(back(rest[above]), step)
+                ways[joint] = to_world(inverse(rest[above]), step)
         for joint, way in ways.items():
             self._check(joint, way)
         for joint in range(self.target.n_joints):
             self._write(joint, ways.get(joint), columns)
 
     def _carrier(self, joint: int, other: int) -> int:
-        """The joint whose position channels carry ``joint``: itself or the nearest above it.
+        """The joint whose position channels move ``joint``: itself or the nearest above it.
 
-        -1 where none has any, and nothing has to be carried. Raises OptionError.
+        -1 where none has any, and none is needed. Raises OptionError.
         """
         carrier = joint
         while carrier >= 0 and not moves(self.target.joints[carrier].channels):
@@ -265,7 +272,7 @@ class Travel:
         return carrier
 
     def _check(self, joint: int, way: Floats) -> None:
-        """Raise OptionError where a joint has to go where no position channel leads."""
+        """Raise OptionError for a joint that must move but has no position channel."""
         kinds = {channel.kind for channel in self.target.joints[joint].channels}
         least = ROUNDING * reach(self.target)
         for kind, track in zip(POSITION_KINDS, way, strict=True):
@@ -276,7 +283,7 @@ class Travel:
                 )
 
     def _way(self, joint: int, other: int) -> Floats:
-        """Shift of ``joint`` from its rest, (3, F): all above it is at rest."""
+        """Shift of ``joint`` from its rest, (3, F), with all joints above it at rest."""
         rest = rest_positions(self.target)[joint]
         result: Floats = self.scale * self.origins[:, other].T - rest[:, None]
         return result

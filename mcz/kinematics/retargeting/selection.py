@@ -1,4 +1,4 @@
-"""Selected joints of a motion, baked onto other parents where theirs are left out."""
+"""Selected joints of a motion, baked onto other parents where their own are left out."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Chain, multiply_matrices
 from mcz.kinematics.retargeting.matching import check_channels, computed_signal, replace_motion
 from mcz.kinematics.retargeting.turns import (
-    back,
-    finite,
-    hold_known,
+    fill_unknown,
+    finite_frames,
+    inverse,
     local_turns,
-    relative,
+    relative_turns,
     set_local_turns,
 )
 from mcz.kinematics.rotations import ORDERS, euler_order
@@ -40,24 +40,24 @@ SCALING = ("sx", "sy", "sz")
 def select(
     motion: Motion, joints: str | int | Iterable[str | int], *, allow_translation: bool = False
 ) -> Motion:
-    """``motion`` with these joints alone, by name or index, in the order of its skeleton.
+    """``motion`` with only these joints, by name or index, in the order of its skeleton.
 
-    Every joint stays where it was, and turned as it was. The parent of a joint is the nearest one
-    above it that is kept. Numbers are kept bit for bit, with their grids and masks; other signals
-    are kept as they are. What is returned has no source.
+    Every joint keeps its position and rotation in the world. The parent of a joint is the nearest
+    kept one above it. Numbers are kept bit for bit, with their grids and masks; other signals are
+    kept unchanged. The result has no source.
 
-    What is left out may be anything that no kept joint hangs on. A joint above a kept one may be
-    left out where it has no channels that move it, or never leaves rest in this motion: its offset
-    is added to that of the kept one. Any other is refused, unless ``allow_translation``: then the
-    kept one gets position channels and three rotation channels in place of its own, computed, on a
-    grid of 6 decimals.
+    A joint may be left out if no kept joint is below it. A joint above a kept one may be left out
+    if it has no channels that move it, or never leaves rest in this motion: its offset is added to
+    the kept one's. Any other is refused, unless ``allow_translation``: then the kept one gets
+    position channels and three rotation channels in place of its own, computed, on a grid of 6
+    decimals.
 
-    Raises OptionError for a joint that is not there, for none at all, and, naming it, for one in
-    between that cannot be left out; MotionError where the channels are not those of the skeleton.
+    Raises OptionError for an unknown joint, for none at all, and, naming it, for one in between
+    that cannot be left out; MotionError where the channels differ from the skeleton's.
     """
     check_channels(motion)
     skeleton = motion.skeleton
-    kept = _kept(skeleton, joints)
+    kept = _kept_joints(skeleton, joints)
     above = _parents(skeleton, kept)
     moved = {joint: name for joint in kept if (name := _obstacle(motion, joint, above[joint]))}
     if moved and not allow_translation:
@@ -78,7 +78,7 @@ def select(
     return replace_motion(motion, selected, signal)
 
 
-def _kept(skeleton: Skeleton, joints: str | int | Iterable[str | int]) -> list[int]:
+def _kept_joints(skeleton: Skeleton, joints: str | int | Iterable[str | int]) -> list[int]:
     named = [joints] if isinstance(joints, (str, int, np.integer)) else list(joints)
     if not named:
         raise OptionError("select: no joint is to be kept")
@@ -104,7 +104,6 @@ def _parents(skeleton: Skeleton, kept: list[int]) -> dict[int, int]:
 
 
 def _between(skeleton: Skeleton, joint: int, above: int) -> list[int]:
-    """The joints between a joint and one above it, from the lowest up."""
     between = []
     parent = skeleton.joints[joint].parent
     while parent != above:
@@ -114,11 +113,11 @@ def _between(skeleton: Skeleton, joint: int, above: int) -> list[int]:
 
 
 def _obstacle(motion: Motion, joint: int, above: int) -> str:
-    """The name of a joint that keeps those between from being left out, "" where none does."""
+    """The name of a joint in between that cannot be left out, "" if all can."""
     skeleton = motion.skeleton
     between = _between(skeleton, joint, above)
     moving = [k for k in between if not _rests(motion, k)]
-    if between and above >= 0:  # it would stretch the whole of the longer bone
+    if between and above >= 0:  # it would stretch the longer bone
         kinds = {channel.kind for channel in skeleton.joints[above].channels}
         moving += [above] * bool(kinds & set(SCALING))
     return skeleton.joint_names[moving[0]] if moving else ""
@@ -137,7 +136,7 @@ def _rests(motion: Motion, index: int) -> bool:
 
 
 def _fold_offsets(skeleton: Skeleton, index: int, above: int) -> Joint:
-    """The joint with the offsets of those between it and ``above`` added to its own."""
+    """Add the offsets of the joints between it and ``above`` to the joint's own."""
     joint = skeleton.joints[index]
     between = _between(skeleton, index, above)
     base = skeleton.offsets[between[::-1]].sum(axis=0)
@@ -157,26 +156,26 @@ STRETCHING = ("sx", "sy", "sz", "length")
 def bake_joints(
     motion: Motion, above: Mapping[int, int], kept: list[int], selected: Skeleton, signal: Signal
 ) -> tuple[Skeleton, Signal]:
-    """``selected`` and ``signal`` with position and rotation channels that hold some joints.
+    """``selected`` and ``signal`` with position and rotation channels for some joints.
 
-    ``above`` has, of every joint of ``motion`` to be held, the one that it hangs on now, or -1;
-    ``kept`` are the joints of ``selected`` as those of ``motion``. Raises OptionError where that
-    one stretches what hangs on it.
+    ``above`` has, for every joint of ``motion`` to bake, its new parent, or -1; ``kept`` are the
+    joints of ``selected`` as joints of ``motion``. Raises OptionError where the new parent
+    stretches what is below it.
     """
     skeleton = motion.skeleton
     chain = Chain(skeleton)
     values = np.ascontiguousarray(np.asarray(motion.values, np.float64).T)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         turns = {k: local_turns(chain, k, values) for k in range(skeleton.n_joints)}
-        places = _places(chain, np.asarray(motion.values, np.float64), above)
+        places = _joint_placements(chain, np.asarray(motion.values, np.float64), above)
     joints = list(selected.joints)
     columns: dict[int, Floats] = {}
     for joint, parent in above.items():
         _check(skeleton, parent)
-        turn = relative(chain, parent, joint, turns)
+        turn = relative_turns(chain, parent, joint, turns)
         turn = np.broadcast_to(turn, (3, 3, values.shape[1]))
         number = kept.index(joint)
-        joints[number] = _held_joint(skeleton, joints[number], turn)
+        joints[number] = _baked_joint(skeleton, joints[number], turn)
         columns[number] = np.concatenate([places[joint], _angles(selected, joints[number], turn)])
     made = replace(selected, joints=tuple(joints))
     return made, _join_signals(motion, selected, made, signal, columns)
@@ -190,7 +189,7 @@ def _check(skeleton: Skeleton, parent: int) -> None:
         )
 
 
-def _places(chain: Chain, values: Floats, above: Mapping[int, int]) -> dict[int, Floats]:
+def _joint_placements(chain: Chain, values: Floats, above: Mapping[int, int]) -> dict[int, Floats]:
     """Origin of each joint from its parent's, along the parent's axes, (3, F)."""
     places = {joint: np.empty((3, len(values))) for joint in above}
     for rows, _, pose in chain.poses(values):
@@ -200,17 +199,17 @@ def _places(chain: Chain, values: Floats, above: Mapping[int, int]) -> dict[int,
                 axes, own = pose.axes[parent], chain.turned[parent]
                 world = axes if own is None else multiply_matrices(axes, own.T[:, :, None])
                 step = place - pose.origins[parent]
-                place = multiply_matrices(back(world), step[:, None])[:, 0]
+                place = multiply_matrices(inverse(world), step[:, None])[:, 0]
             places[joint][:, rows] = place
     return places
 
 
-def _held_joint(skeleton: Skeleton, joint: Joint, turn: Floats) -> Joint:
+def _baked_joint(skeleton: Skeleton, joint: Joint, turn: Floats) -> Joint:
     """The joint with three position channels, three rotation channels, and others of its own."""
     kinds = [c.kind for c in joint.channels if c.kind in TURNING_KINDS]
     order = "".join(kind[1] for kind in kinds)
     if order not in ORDERS or kinds[0] not in ROTATION_KINDS:
-        order = euler_order(hold_known(turn, finite(turn)))
+        order = euler_order(fill_unknown(turn, finite_frames(turn)))
         order = order if skeleton.intrinsic else order[::-1]
     others = tuple(c for c in joint.channels if c.kind not in (*TURNING_KINDS, *POSITION_KINDS))
     own = tuple(Channel(kind) for kind in (*POSITION_KINDS, *(f"r{letter}" for letter in order)))
@@ -229,7 +228,7 @@ def _angles(selected: Skeleton, joint: Joint, turn: Floats) -> Floats:
 def _join_signals(
     motion: Motion, before: Skeleton, after: Skeleton, signal: Signal, columns: dict[int, Floats]
 ) -> Signal:
-    """``signal`` of ``before``, with ``columns`` of the joints that were held, as of ``after``."""
+    """``signal`` of ``before``, with ``columns`` of the baked joints, as of ``after``."""
     new = computed_signal(motion, np.concatenate([*columns.values()]).T)
     first = signal.n_channels
     order: list[int] = []
@@ -242,10 +241,10 @@ def _join_signals(
             own = [k for k, c in zip(own, joint.channels, strict=True) if c.kind not in kinds]
         order += own
     assert len(order) == after.n_channels
-    return _beside(signal, new).of_columns(order)
+    return _join_columns(signal, new).of_columns(order)
 
 
-def _beside(left: Signal, right: Signal) -> Signal:
+def _join_columns(left: Signal, right: Signal) -> Signal:
     masks = [
         np.ones(part.values.shape, np.bool_) if part.mask is None else part.mask
         for part in (left, right)

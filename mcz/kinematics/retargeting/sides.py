@@ -1,4 +1,4 @@
-"""Left and right: which joint is the counterpart of which, by their names."""
+"""Left and right: the counterpart of each joint, by names."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from mcz.model.text_format import among
 
 # A whole word: "LeftUpLeg", "upperarm_left", "LEFT_HIP", but neither "Bright" nor "cleft".
 _WORD = re.compile(r"Left|Right|LEFT|RIGHT|(?<![A-Za-z])(?:left|right)")
-# A letter by itself: "Bip01 L Foot", "thigh_R", "hand.l".
+# A separate letter: "Bip01 L Foot", "thigh_R", "hand.l".
 _LETTER = re.compile(r"(?<![A-Za-z0-9])[LlRr](?![A-Za-z0-9])")
 # A letter before or after a word: "lfemur", "LHipJoint", "__rThigh", "ThighL". Other words begin
 # so as well, such as "lowerback" and "root".
 _PREFIX = re.compile(r"(?<![A-Za-z0-9])[LlRr](?=[A-Za-z])")
 _SUFFIX = re.compile(r"(?<=[a-z])[LR](?=$|[^A-Za-z])")
-# What follows the letter where it cannot be but a side.
+# Rests of a word after the letter that prove a side.
 _BODY = re.compile(
     r"hip|buttock|thigh|up(?:per)?_?leg|femur|knee|shin|calf|tibia|leg|ankle|foot|toe|heel|collar|"
     r"clavicle|shoulder|shldr|humerus|up(?:per)?_?arm|arm|elbow|fore_?arm|radius|ulna|wrist|hand|"
@@ -40,41 +40,40 @@ _OTHER = {
 def counterparts(names: Sequence[str], pairs: Mapping[str, str] | None = None) -> list[int]:
     """Counterpart of every joint on the other side, by index; itself for one without a side.
 
-    ``names`` are those of all joints, each once. ``pairs`` maps names to names, in one direction
-    or both, before names are looked at; to its own name what has no side. Raises OptionError for a
-    joint in ``pairs`` that is not there or has two counterparts, and for a name that says a side
-    whose counterpart is missing.
+    ``names`` are the names of all joints, each once. ``pairs`` maps names to names, in one
+    direction or both, with precedence; a joint without a side maps to its own name. Raises
+    OptionError for a joint in ``pairs`` that is unknown or has two counterparts, and for a name of
+    a side whose counterpart is missing.
     """
     numbers = {name: number for number, name in enumerate(names)}
-    found = _pair_numbers(numbers, pairs or {})
+    partners = _pair_numbers(numbers, pairs or {})
     for name, number in numbers.items():
-        if number not in found:
+        if number not in partners:
             other = numbers[name] if (mate := _mate(name, numbers)) is None else numbers[mate]
-            if other in found:  # taken by ``pairs``
+            if other in partners:  # taken by ``pairs``
                 raise OptionError(
                     f"mirror: {names[other]!r} would be the counterpart of {name!r} and of "
-                    f"{names[found[other]]!r}; name the pairs of all three"
+                    f"{names[partners[other]]!r}; name the pairs of all three"
                 )
-            found[number], found[other] = other, number
-    return [found[number] for number in range(len(names))]
+            partners[number], partners[other] = other, number
+    return [partners[number] for number in range(len(names))]
 
 
 def _pair_numbers(numbers: Mapping[str, int], pairs: Mapping[str, str]) -> dict[int, int]:
-    found: dict[int, int] = {}
+    partners: dict[int, int] = {}
     for one, other in pairs.items():
         for name in (one, other):
             if name not in numbers:
                 known = among(list(numbers), name)
                 raise OptionError(f"mirror: pairs: no joint {name!r} among {known}")
         a, b = numbers[one], numbers[other]
-        if found.get(a, b) != b or found.get(b, a) != a:
+        if partners.get(a, b) != b or partners.get(b, a) != a:
             raise OptionError(f"mirror: pairs: {one!r} or {other!r} has two counterparts")
-        found[a], found[b] = b, a
-    return found
+        partners[a], partners[b] = b, a
+    return partners
 
 
 def _mate(name: str, names: Mapping[str, int]) -> str | None:
-    """The name of the counterpart, None for a name without a side."""
     for pattern in (_WORD, _LETTER):
         others = [other for other in _swap_sides(pattern, name) if other in names]
         if others:
@@ -98,7 +97,7 @@ def _mate(name: str, names: Mapping[str, int]) -> str | None:
 
 
 def _swap_sides(pattern: re.Pattern[str], name: str) -> Iterator[str]:
-    """The name with its sides changed: all of them, then each alone."""
+    """The name with its sides swapped: all of them, then each alone."""
     if pattern.search(name):
         yield pattern.sub(lambda match: _OTHER[match[0]], name)
     for match in pattern.finditer(name):
@@ -108,14 +107,14 @@ def _swap_sides(pattern: re.Pattern[str], name: str) -> Iterator[str]:
 def sides_of(names: Sequence[str]) -> list[str]:
     """Side of every joint by its name: "left", "right" or "".
 
-    A mere letter before or after a word says it where the name with the other letter is there, or
-    the word is a part of the body. ``names`` are those of all joints.
+    A single letter before or after a word counts if the name with the other letter exists, or the
+    word is a part of the body. ``names`` are the names of all joints.
 
     >>> sides_of(["root", "lfemur", "rfemur", "lowerback", "Hand.L", "LeftFoot"])
     ['', 'left', 'right', '', 'left', 'left']
     """
-    held = set(names)
-    return [_side(name, held) for name in names]
+    known_names = set(names)
+    return [_side(name, known_names) for name in names]
 
 
 def _side(name: str, names: set[str]) -> str:

@@ -1,13 +1,12 @@
-"""Number grids: what a number of a source file is, as an integer.
+"""Number grids: numbers of source files as integers.
 
-A *grid* is a countable set of numbers together with one way of printing each of them.
-The *ordinal* of a number is its rank among those of the grid: an integer that grows with it.
-Codecs work on ordinals, formats print them, and ``values`` turns them into binary64.
-SPEC.md, "Number grids", is normative.
+A *grid* is a countable set of numbers together with one way of printing each of them. The *ordinal*
+of a number is its rank in the grid, an integer that grows with the number. Codecs work on ordinals,
+formats print them, and ``values`` converts them to binary64. SPEC.md, "Number grids", is normative.
 
-For every text grid and every IEEE or VAX grid the ordinal of a number with a plus sign is its
-magnitude index m >= 0 and that of a number with a minus sign is -1 - m, so that -0 is the
-ordinal -1 and nothing is an exception only because of its sign.
+In every text grid and every IEEE or VAX grid the ordinal of a number with a plus sign is its
+magnitude index m >= 0, with a minus sign -1 - m. So -0 is the ordinal -1, and no number is an
+exception only because of its sign.
 """
 
 from mcz.model.numbers.choose import bits_of, choose_grid, fit

@@ -35,15 +35,16 @@ if TYPE_CHECKING:
     from mcz.model.numbers.survey_kernels import Survey
 
 
-FEW = 2**14  # tokens of which all candidates are tried in order
-_SAMPLE = 4096  # tokens that are looked at for candidates; all of them are counted
-_STEP = 2_654_435_761  # from one of them to the next: a prime, so that all columns are seen
-_EXCEPTION_BITS = 200  # row, channel and text, a guess
+EXHAUSTIVE_TOKENS = 2**14  # up to so many tokens, all candidates are tried in order
+_SAMPLE = 4096  # tokens of the sample that suggests candidates; all tokens are counted
+# from one sampled token to the next: a prime, so that all columns are sampled
+_STEP = 2_654_435_761
+_EXCEPTION_BITS = 200  # estimated bits of row, channel and text
 _DIGIT_BITS = 3.33
 _SIGN_AND_RANGE_BITS = 8.0
 
 Rule = tuple[GridKind, int, int, float, int]  # kind, digits, flags, scale, style
-Candidate = tuple[float, Rule]  # bits of an ordinal, and what makes its grid
+Candidate = tuple[float, Rule]  # bits of an ordinal, and the parameters of its grid
 
 
 def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
@@ -59,13 +60,13 @@ def _survey(tokens: Tokens, n_counted: int) -> Survey:
 
 
 def _candidates(tokens: Tokens, n_sample: int) -> list[Candidate]:
-    """Grids worth a try, by a sample of the tokens, from the fewest bits on."""
+    """Grids worth a try for a sample of the tokens, from the fewest bits on."""
     survey = _survey(tokens, n_sample)
-    found = [(bits, (*rule, 1.0, 0)) for bits, rule in _plain_candidates(survey)]
+    candidates = [(bits, (*rule, 1.0, 0)) for bits, rule in _plain_candidates(survey)]
     n_known, n_plain = int(survey.significant.sum()), int(survey.decimals.sum())
     if 2 * (n_known - n_plain) > n_known or survey.significant[10:].any():
-        found += printed_candidates(_sample_tokens(tokens, n_sample))
-    return sorted(found)
+        candidates += printed_candidates(_sample_tokens(tokens, n_sample))
+    return sorted(candidates)
 
 
 def _sample_tokens(tokens: Tokens, n_sample: int) -> Tokens:
@@ -73,7 +74,6 @@ def _sample_tokens(tokens: Tokens, n_sample: int) -> Tokens:
 
 
 def _plain_candidates(survey: Survey) -> Iterator[tuple[float, tuple[GridKind, int, int]]]:
-    """All grids but PRINTED."""
     decimals, significant = survey.decimals.tolist(), survey.significant.tolist()
     if not any(significant):
         yield 0.0, (GridKind.FIXED, 0, 0)
@@ -107,7 +107,7 @@ def _bits(digits: int) -> float:
 
 
 def _ends(histogram: Sequence[int]) -> list[int]:
-    """The count that 99 % do not exceed, and the largest: a stray long token costs little."""
+    """The count that 99 % do not exceed, and the largest count."""
     ranks = list(accumulate(histogram))
     n = ranks[-1]
     return sorted({bisect_right(ranks, rank) for rank in (n - 1, (n * 99 - 1) // 100)})
@@ -142,29 +142,30 @@ def _surveys() -> ModuleType:
 
 
 def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
-    """The grid of ``fit``, for who needs no ordinals yet."""
+    """The grid of ``fit``, for callers that need no ordinals."""
     return fit(tokens, prefer)[0]
 
 
 def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]:
-    """The text grid that needs the fewest bytes for ``tokens``, exceptions counted.
+    """The text grid that needs the fewest bytes for ``tokens``, exceptions included.
 
-    With it, what its ``ordinals_of_tokens`` gives. The first of ``prefer`` without exceptions is
-    taken at once, and the first that has no more exceptions than the best of all others.
+    Returned with the result of its ``ordinals_of_tokens``. The first of ``prefer`` without
+    exceptions is chosen at once, as is the first that has no more exceptions than the best of all
+    others.
     """
     if not (tokens.known or tokens.bad().any()):
-        tokens.values()  # several grids ask for them, and for those of some of the tokens
-    wanted = []
+        tokens.values()  # several grids need them, or some of them
+    preferred = []
     for grid in prefer:
-        wanted.append((grid, *grid.ordinals_of_tokens(tokens)))
-        if wanted[-1][2].all():
-            return wanted[-1]
+        preferred.append((grid, *grid.ordinals_of_tokens(tokens)))
+        if preferred[-1][2].all():
+            return preferred[-1]
     n_sample = min(len(tokens), _SAMPLE)
     ranked = _candidates(tokens, n_sample)
     order: Sequence[int] = range(len(ranked))
-    if len(tokens) > FEW:
+    if len(tokens) > EXHAUSTIVE_TOKENS:
         order = _likeliest_first(_sample_tokens(tokens, n_sample), ranked)
-    least = float("inf"), len(ranked)  # the lowest price, and the first candidate that has it
+    least = float("inf"), len(ranked)  # the lowest price, and the first candidate with it
     for rank in order:
         bits, rule = ranked[rank]
         if (cost(len(tokens), bits, 0), rank) >= least:
@@ -174,13 +175,13 @@ def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]
         price = cost(len(tokens), bits, misses), rank
         if tried is not None and price < least:
             least, fewest, best = price, misses, (Grid(*rule), *tried)
-    return next((fitted for fitted in wanted if np.count_nonzero(~fitted[2]) <= fewest), best)
+    return next((fitted for fitted in preferred if np.count_nonzero(~fitted[2]) <= fewest), best)
 
 
 def _likeliest_first(sample: Tokens, ranked: Sequence[Candidate]) -> list[int]:
-    """The candidates, with that one first that all others are likely to lose against.
+    """Move the candidate to the front that probably beats all others.
 
-    They are then given up early. Only grids that are quick to try come first.
+    The others are then given up early. Only grids that are quick to try come first.
     """
     prices = [
         cost(len(sample), bits, _fewest_misses(sample, rule))
@@ -193,9 +194,9 @@ def _likeliest_first(sample: Tokens, ranked: Sequence[Candidate]) -> list[int]:
 
 
 def _try_rule(tokens: Tokens, rule: Rule, spare: float) -> tuple[Ints, Bools] | None:
-    """Ordinals and printed tokens; None where exceptions cost more than ``spare`` bits."""
+    """Ordinals and mask of printed tokens; None if exceptions cost more than ``spare`` bits."""
     kind, digits, flags, _, _ = rule
-    allowed = int(min(spare / _EXCEPTION_BITS, len(tokens))) + 1  # prices decide, not this
+    allowed = int(min(spare / _EXCEPTION_BITS, len(tokens))) + 1  # a loose bound: prices decide
     if kind in DECIMAL_KINDS:
         ordinals, known, misses = textgrids.match(tokens, kind, digits, flags, allowed)
         return (ordinals, known) if misses <= allowed else None
@@ -217,22 +218,22 @@ def bits_of(grid: Grid) -> float:
 
 
 def _fewest_misses(tokens: Tokens, rule: Rule) -> int:
-    """Tokens that the shape alone rules out, which spares grids that are costly to try."""
+    """Count tokens that their shape alone excludes, to spare grids that are costly to try."""
     kind, digits, flags, _, style = rule
     if kind == GridKind.PRINTED:
         return int(np.count_nonzero(~printed.plausible(tokens, style)))
     bound = textgrids.match(tokens, kind, digits, flags)[2]
     if kind in CHECKED_KINDS and bound:
-        bound -= int(np.count_nonzero(textgrids.long(tokens)))
+        bound -= int(np.count_nonzero(textgrids.too_long(tokens)))
     return bound
 
 
 NEARLY_ALL = 0.99  # of the tokens: a stray one costs little
-MANY_BITS = 2.0**26  # of a number of decimals: no chance that it is a binary32
+MANY_BITS = 2.0**26  # numbers of decimals above this are not binary32
 
 
 def printed_candidates(tokens: Tokens) -> Iterator[Candidate]:
-    """Grids worth a try, for a sample of the tokens, with the bits of an ordinal, a guess."""
+    """Grids worth a try for a sample of the tokens, with the estimated bits of an ordinal."""
     loops = kernels()
     shape = tokens.fields[:, 2]
     known = shape & (loops.BAD | loops.SPECIAL) == 0
@@ -256,7 +257,7 @@ def printed_candidates(tokens: Tokens) -> Iterator[Candidate]:
         for base in (*_decimals(values), BASE_64):
             if 16 < fixed <= MOST_DECIMALS:
                 yield _with_bits(base, 0, SHORT_FIXED + fixed)
-            if base != BASE_64:  # TEXT64 has that
+            if base != BASE_64:  # TEXT64 covers it
                 yield _with_bits(base, 0, SIGNIFICANT + 17)
     if _are_binary32(values, values * 2e-16 * 5):
         for digits in (16, 17):
@@ -310,12 +311,11 @@ def _exponents(tokens: Tokens, decimals: Ints) -> Iterator[Candidate]:
 
 
 def _decimals(values: Floats) -> Iterator[int]:
-    """The fewest decimals that give nearly all values, if there are any."""
     for digits in range(1, 16):
         with np.errstate(over="ignore"):
             scaled = np.rint(values * TENS[digits])
-        same = (scaled / TENS[digits] == values) & (scaled <= DECIMAL_LIMIT)
-        if len(values) and np.mean(same) >= NEARLY_ALL:
+        is_equal = (scaled / TENS[digits] == values) & (scaled <= DECIMAL_LIMIT)
+        if len(values) and np.mean(is_equal) >= NEARLY_ALL:
             yield digits
             return
 

@@ -34,7 +34,7 @@ _IEEE = (GridKind.BINARY32, GridKind.BINARY64)
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A number grid. ``digits``, ``flags`` and ``style`` mean what SPEC.md, "Number grids", says.
+    """A number grid. SPEC.md, "Number grids", defines ``digits``, ``flags`` and ``style``.
 
     Arrays of ordinals and values may have any shape. Every int64 is an ordinal of a number or is
     refused with FormatError. Raises OptionError for digits, flags, a scale or a style out of range.
@@ -45,7 +45,7 @@ class Grid:
     flags: int = 0
     scale: float = 1.0
     style: int = 0
-    _hash: int = field(init=False, repr=False, compare=False)  # many grids are looked up at once
+    _hash: int = field(init=False, repr=False, compare=False)  # many grids are looked up in dicts
 
     def __post_init__(self) -> None:
         try:
@@ -82,7 +82,7 @@ class Grid:
         return -1 - self.limit if self.signed_magnitude else -self.limit
 
     def magnitudes(self, ordinals: Values) -> Ints:
-        """Magnitude indices; FormatError for an ordinal that is no number's."""
+        """Magnitude indices; raises FormatError for an ordinal without a number."""
         whole: Ints = np.ascontiguousarray(ordinals, np.int64)
         low, limit = self.lowest, self.limit
         if whole.size and not (low <= whole.min() and whole.max() <= limit):  # GRID-05
@@ -119,10 +119,10 @@ class Grid:
         return values
 
     def ordinals(self, values: Values) -> tuple[Ints, Bools]:
-        """The ordinal of each value, and whether ``values`` gives exactly these bits back.
+        """The ordinal of each value, and whether ``values`` restores exactly these bits.
 
-        Where the grid does not have a value: the ordinal of a nearest one, the last one beyond
-        the end; 0 for NaN. On IEEE grids infinities and the canonical NaN are numbers too.
+        A value outside of the grid has the ordinal of a nearest number, beyond the end the last
+        one; NaN has 0. On IEEE grids infinities and the canonical NaN are numbers too.
         """
         values = np.ascontiguousarray(values, np.float64)
         negative = np.signbit(values)
@@ -142,7 +142,6 @@ class Grid:
         return ordinals, exact
 
     def _indices(self, values: Floats) -> Ints:
-        """Magnitude indices of values >= 0 that are not NaN."""
         match self.kind:
             case GridKind.FIXED | GridKind.TRIMMED:
                 return scaled_magnitudes(values, TENS[self.digits], False, self.limit)
@@ -186,9 +185,9 @@ class Grid:
         return "<u8" if self.kind == GridKind.BINARY64 else "<u4"
 
     def ordinals_of_tokens(self, tokens: Tokens) -> tuple[Ints, Bools]:
-        """The ordinal of each token, and whether ``texts`` gives exactly its text back.
+        """The ordinal of each token, and whether ``texts`` restores exactly its text.
 
-        Where it does not (an exception), the ordinal is 0.
+        An exception, whose text is not restored, has the ordinal 0.
         """
         self._check_text()
         if self.kind == GridKind.PRINTED:
@@ -211,15 +210,15 @@ class Grid:
         return ordinals, known
 
     def _printed_ordinals(self, tokens: Tokens) -> tuple[Ints, Bools]:
-        """The same of a PRINTED grid: what has the right shape is printed, and compared."""
+        """``ordinals_of_tokens`` of a PRINTED grid: plausible tokens are printed, and compared."""
         known = printed.plausible(tokens, self.style)
         ordinals = np.zeros(len(tokens), np.int64)
         chosen = tokens[known]
         values = chosen.values()
         indices = np.minimum(self._indices(np.minimum(np.abs(values), MAX)), self.limit)
         ordinals[known] = indices ^ -np.signbit(values).astype(np.int64)
-        same = self.texts(ordinals[known]).equal(chosen.texts())
-        known[known] = same & np.isfinite(values)
+        is_equal = self.texts(ordinals[known]).equal(chosen.texts())
+        known[known] = is_equal & np.isfinite(values)
         ordinals[~known] = 0
         return ordinals, known
 
@@ -286,13 +285,13 @@ GRID = Adapted(GridFields, _grid_of, _fields_of)
 
 
 def _beyond(chosen: Bools, values: Floats) -> Bools:
-    """Mask of all tokens beyond binary64; ``values`` are those of ``chosen``.
+    """Mask of all tokens beyond binary64; ``values`` are the values of ``chosen``.
 
     The greatest number, printed with fewer digits, reads as infinity: its text is an exception.
     """
-    beyond = np.zeros(len(chosen), np.bool_)
-    beyond[chosen] = ~np.isfinite(values)
-    return beyond
+    mask = np.zeros(len(chosen), np.bool_)
+    mask[chosen] = ~np.isfinite(values)
+    return mask
 
 
 def grid_blocks(

@@ -1,12 +1,12 @@
 """Loops over decimal numbers in text: read them, compare them with a grid, print them.
 
-A token is described by a row of three int64, from which its text can be told exactly unless LONG:
+A token is described by a row of three int64, which determines its text unless LONG:
 
 0. its digits read as one integer, leading zeros dropped (below 10^18)
 1. the number after its ``e``, 0 without one, clamped to +-``HUGE``
 2. shape: the bits below, and ``SIGNIFICANT``, ``EXPONENT_DIGITS``, ``FRACTION_DIGITS`` above them
 
-Everything is int64, the one kind of integer that compiled loops have.
+Everything is int64, the only integer type of compiled loops.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ _POINT_ZERO, _POINT_ONLY, _NO_ZERO, _PLUS, _EXP3, _EXP1, _UPPER = 1, 2, 4, 8, 16
 
 @kernel
 def scan(text: Bytes, start: Ints, stop: Ints, fields: Ints2) -> int:
-    """Fill ``fields`` (n, 3) from tokens ``text[start[i]:stop[i]]``; returns how many are bad."""
+    """Fill ``fields`` (n, 3) from tokens ``text[start[i]:stop[i]]``; returns the number of bad
+    ones.
+    """
     n_bad = 0
     for token in range(len(start)):
         at, end = start[token], stop[token]
@@ -87,9 +89,9 @@ def scan(text: Bytes, start: Ints, stop: Ints, fields: Ints2) -> int:
 
 @kernel
 def values(fields: Ints2, tens: Floats, out: Floats, slow: Flags) -> int:
-    """Fill ``out`` with the nearest binary64 of each token; returns how many are left.
+    """Fill ``out`` with the nearest binary64 of each token; returns the number of tokens left out.
 
-    ``slow`` is set for these, whose mantissa or power of ten no binary64 holds exactly.
+    ``slow`` is set for these: no binary64 holds their mantissa or power of ten exactly.
     """
     n_slow = 0
     for token in range(len(fields)):
@@ -135,13 +137,13 @@ def match(
     printed: Flags,
     allowed: int,
 ) -> int:
-    """Ordinals of the tokens that a decimal grid prints; returns how many it does not print.
+    """Ordinals of the tokens that a decimal grid prints; returns the number of other tokens.
 
-    It stops where these are more than ``allowed``.
+    Stops after more than ``allowed`` of these.
 
     ``rule``: significant digits or 0, decimals, trimmed, low, high, flags, limit. With digits:
-    ``%g``, with an exponent below ``low`` and from ``high`` on. Without: so many decimals,
-    or up to so many where trimmed. Magnitudes above ``limit`` are not printed.
+    ``%g``, with an exponent below ``low`` and from ``high`` on. Without: so many decimals, or up to
+    so many where trimmed. Magnitudes above ``limit`` are not printed.
     """
     digits, decimals, trim, low, high, flags, limit = rule
     refused = LONG | SPECIAL | BAD | EXTRA_ZERO | (0 if digits else EXPONENT)
@@ -274,7 +276,7 @@ def put(
     out: Bytes,
     at: int,
 ) -> int:
-    """Print ``mantissa * 10^-fraction`` at ``at``, by a rule as ``write`` has it; its end.
+    """Print ``mantissa * 10^-fraction`` at ``at``, by a rule as in ``write``; returns the end.
 
     ``count``: the digits of the mantissa, 0 for 0.
     """
@@ -340,15 +342,15 @@ def _eight_digits(number: int) -> int:
 
 
 def _digits(mantissa: int, count: int, out: Bytes, at: int) -> int:
-    """Print the last ``count`` digits of ``mantissa`` at ``at``; returns those before them."""
+    """Print the last ``count`` digits of ``mantissa`` at ``at``; returns the digits before them."""
     index = at + count
     while index > at + 1:
         rest = mantissa // 100
-        two = mantissa - 100 * rest
-        ten = two * 103 >> 10
+        pair = mantissa - 100 * rest
+        ten = pair * 103 >> 10
         index -= 2
         out[index] = 48 + ten
-        out[index + 1] = 48 + two - 10 * ten
+        out[index + 1] = 48 + pair - 10 * ten
         mantissa = rest
     if index > at:
         rest = mantissa // 10

@@ -1,8 +1,8 @@
-"""Magnitude indices and the binary64 that they stand for, one pair of functions a family.
+"""Magnitude indices and the binary64 that they stand for, a pair of functions for each family.
 
 A magnitude index is an int64 >= 0 within the limit of its grid (the caller checks that); values
 here have no sign. ``*_values`` are normative (SPEC.md, "Number grids"); ``*_magnitudes`` find the
-index of a finite value >= 0, the nearest one where the grid does not have it.
+index of a finite value >= 0, or of the nearest number of the grid.
 """
 
 from __future__ import annotations
@@ -35,20 +35,21 @@ def general_magnitudes(values: Floats, digits: int) -> Ints:
     values = np.where(zero, 1.0, values)
     power = np.floor(np.log10(values)).astype(np.int64)
     # GRID-11
-    power -= values < POWERS[power - _LEAST_POWER]  # just below a power, the logarithm is its own
+    # just below a power the logarithm equals the power's
+    power -= values < POWERS[power - _LEAST_POWER]
     shift = digits - 1 - power
-    odd = np.abs(shift) > EXACT_POWER
-    tens = TENS[np.where(odd, 0, np.abs(shift))]
-    mantissa = np.rint(np.where(shift < 0, values / tens, np.where(odd, 0.0, values) * tens))
+    needs_text = np.abs(shift) > EXACT_POWER
+    tens = TENS[np.where(needs_text, 0, np.abs(shift))]
+    mantissa = np.rint(np.where(shift < 0, values / tens, np.where(needs_text, 0.0, values) * tens))
     block = 10 ** (digits - 1)
-    odd |= (mantissa < block) | (mantissa >= 10 * block)
-    mantissa = np.where(odd, 0, mantissa).astype(np.int64)
-    if odd.any():
-        texts = [f"{value:.{digits - 1}e}".split("e") for value in values[odd].tolist()]
-        mantissa[odd] = [int(digits.replace(".", "")) for digits, _ in texts]
-        power[odd] = [int(power) for _, power in texts]
+    needs_text |= (mantissa < block) | (mantissa >= 10 * block)
+    mantissa = np.where(needs_text, 0, mantissa).astype(np.int64)
+    if needs_text.any():
+        texts = [f"{value:.{digits - 1}e}".split("e") for value in values[needs_text].tolist()]
+        mantissa[needs_text] = [int(digits.replace(".", "")) for digits, _ in texts]
+        power[needs_text] = [int(power) for _, power in texts]
     zero |= power < MIN_POWER
-    power = np.clip(power, MIN_POWER, MAX_POWER + 1)  # beyond the end is past the limit
+    power = np.clip(power, MIN_POWER, MAX_POWER + 1)  # numbers beyond the end exceed the limit
     magnitudes = (power - MIN_POWER) * 9 * block + 1 + mantissa - block
     return np.where(zero, 0, magnitudes)
 

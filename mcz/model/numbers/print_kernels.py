@@ -34,10 +34,10 @@ def fill(
     start: Ints2,
     size: Ints2,
 ) -> int:
-    """Print the nearest number of each value's grid to ``out``; returns how many bytes.
+    """Print the nearest number of each value's grid to ``out``; returns the number of bytes.
 
-    ``start``, counted from ``base``, and ``size`` say where each text lies. What has no decimal
-    grid, is beyond its grid or none, or is given by no exact product or quotient, is left as it is.
+    ``start``, counted from ``base``, and ``size`` locate each text. They stay unchanged for a value
+    without a decimal grid, beyond its grid, NaN, or without an exact product or quotient.
     """
     at = 0
     for t in range(len(values)):
@@ -51,7 +51,7 @@ def fill(
                 minus = 1.0 / value < 0.0
                 fraction = rules[c, POWER] if digits == FIXED else 0
             elif digits == OTHER or not amount < powers[GREATEST_POWER - LEAST_POWER]:
-                continue  # nor is that NaN
+                continue  # NaN too
             elif digits == FIXED:
                 count = np.rint(amount * tens[rules[c, POWER]])
                 if not count < float(rules[c, LIMIT]):

@@ -1,8 +1,8 @@
 """The PRINTED grid: numbers of one sort, printed by another rule. SPEC.md, "Number grids".
 
-Its digits say what the numbers are, its style how C prints the binary64 that they are: ``%.nf`` for
-n, ``%.nf`` of 17 digits and zeros for ``SHORT_FIXED`` + n, ``%.ng`` for ``SIGNIFICANT`` + n,
-``%.ne`` for ``EXPONENT`` + n.
+Its digits define the numbers, its style how C prints them as binary64: ``%.nf`` for n, ``%.nf`` of
+17 digits and zeros for ``SHORT_FIXED`` + n, ``%.ng`` for ``SIGNIFICANT`` + n, ``%.ne`` for
+``EXPONENT`` + n.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from mcz.model.numbers.rules import (
 from mcz.model.numbers.tokens import TENS, Texts, Tokens, kernels, nearest, scan_texts
 from mcz.model.types import Bools, Floats, Ints
 
-ROUND_TRIP = 17  # significant digits that tell every binary64 from all others
-DECIMAL_TRIP = 16  # and those that do so of numbers up to 2^51 on a decimal grid
+ROUND_TRIP = 17  # significant digits that identify every binary64
+DECIMAL_TRIP = 16  # significant digits that identify numbers up to 2^51 on a decimal grid
 
 
 def base_values(digits: int, magnitudes: Ints) -> Floats:
@@ -60,9 +60,9 @@ def magnitudes_of(digits: int, values: Floats) -> Ints:
 
 
 def values_of(digits: int, style: int, magnitudes: Ints) -> Floats:
-    """The binary64 nearest to what is printed: what other readers of the text see."""
+    """The binary64 nearest to the printed text: the value that other readers of the text see."""
     printed = base_values(digits, magnitudes)
-    if _tells(digits, style):
+    if _is_reversible(digits, style):
         return printed
     unique, inverse = np.unique(printed, return_inverse=True)
     print_one = printer(style)
@@ -70,7 +70,7 @@ def values_of(digits: int, style: int, magnitudes: Ints) -> Floats:
     return values[inverse].reshape(printed.shape)
 
 
-def _tells(digits: int, style: int) -> bool:
+def _is_reversible(digits: int, style: int) -> bool:
     """Return True if the text determines the number among all of its base."""
     if digits > BASE_GENERAL:
         return True
@@ -90,9 +90,9 @@ def printer(style: int) -> Callable[[float], str]:
 
 
 def _short_fixed(x: float, decimals: int) -> str:
-    """``%.nf`` as C libraries of Windows had it: zeros behind 17 digits."""
+    """``%.nf`` as in older C libraries of Windows: zeros after 17 digits."""
     mantissa, _, power = f"{x:.{ROUND_TRIP - 1}e}".partition("e")
-    known = ROUND_TRIP - 1 - int(power)  # decimals that 17 digits give
+    known = ROUND_TRIP - 1 - int(power)  # decimals of 17 digits
     if x == 0 or known >= decimals:
         return f"{x:.{decimals}f}"
     digits = mantissa.replace(".", "")
@@ -103,7 +103,7 @@ def _short_fixed(x: float, decimals: int) -> str:
 
 
 def texts(digits: int, style: int, flags: int, magnitudes: Ints, negative: Bools) -> Texts:
-    """Print numbers; their magnitudes have been checked."""
+    """Print numbers whose magnitudes are already checked."""
     values = base_values(digits, magnitudes)
     if SIGNIFICANT < style < EXPONENT:
         return _general(values, style - SIGNIFICANT, flags, negative)
@@ -121,7 +121,6 @@ def texts(digits: int, style: int, flags: int, magnitudes: Ints, negative: Bools
 
 
 def _restyle(line: str, flags: int) -> str:
-    """A number with an exponent in the style of the flags."""
     mantissa, e, power = line.partition("e")
     size = power[1:].lstrip("0") if flags & GridFlag.EXPONENT1 else power[1:]
     width = 3 if flags & GridFlag.EXPONENT3 else 1
@@ -132,7 +131,7 @@ def _general(values: Floats, digits: int, flags: int, negative: Bools) -> Texts:
     fields = scan_texts([f"{x:.{digits - 1}e}" for x in values.tolist()]).fields
     loops = kernels()
     fractions = (fields[:, 2] >> loops.FRACTION_DIGITS) - fields[:, 1]
-    out = np.empty(len(values) * 48 + SPARE, np.uint8)  # as textgrids: the longest has 17 digits
+    out = np.empty(len(values) * 48 + SPARE, np.uint8)  # as in textgrids: the longest has 17 digits
     offsets = np.zeros(len(values) + 1, np.int64)
     rule = 1, -4, digits, flags
     loops.write(negative, np.ascontiguousarray(fields[:, 0]), fractions, rule, out, offsets)

@@ -7,9 +7,9 @@ from enum import IntEnum, IntFlag
 
 import numpy as np
 
-DECIMAL_LIMIT = 2**51 - 1  # below it, neighbours on a decimal grid are different binary64
+DECIMAL_LIMIT = 2**51 - 1  # below it, neighbors on a decimal grid are different binary64
 INTEGER_LIMIT = 2**53
-MIN_POWER, MAX_POWER = -307, 307  # of %g numbers: normal binary64, which 15 digits tell apart
+MIN_POWER, MAX_POWER = -307, 307  # of %g numbers: normal binary64, which 15 digits identify
 FIXED_TEXT = 64  # digits of a TEXT64 grid from here on: %.nf with n = digits - 64
 FIXED_TEXT_LIMIT = int(np.float64(1e21).view(np.int64)) - 1  # where JavaScript's toFixed ends
 BASE_32, BASE_64 = 32, 64  # digits of a PRINTED grid: an IEEE number; smaller: so many decimals;
@@ -51,7 +51,8 @@ TEXT_KINDS = (
     GridKind.PRINTED,
 )
 DECIMAL_KINDS = (GridKind.FIXED, GridKind.TRIMMED, GridKind.GENERAL)
-CHECKED_KINDS = (GridKind.TEXT64, GridKind.TEXT32)  # printed or not is more than shape
+# their tokens need more than a check of the shape
+CHECKED_KINDS = (GridKind.TEXT64, GridKind.TEXT32)
 _STYLE = int(sum(GridFlag))
 _TEXT64_DIGITS = (0, 1, 16, 17, *range(FIXED_TEXT + 10, FIXED_TEXT + 41))
 # kind: allowed digits, allowed flags

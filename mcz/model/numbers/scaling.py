@@ -11,7 +11,7 @@ from mcz.model import text_format
 from mcz.model.checks import DATA_ITEMS, Rule, array_of, check_fields
 from mcz.model.types import Floats, Ints, Values
 
-MAX_INTEGER = 2.0**53  # what a binary64 holds exactly
+MAX_INTEGER = 2.0**53  # greatest integer up to which a binary64 holds all exactly
 
 
 _FLOATS = array_of("f8", 1, "float64 of one dimension")
@@ -31,13 +31,13 @@ class Scaling:
     general: float = 1.0
 
     def check(self, n_channels: int) -> None:
-        """Raise MotionError where this is no scaling of so many channels."""
+        """Raise MotionError unless this is a scaling of so many channels."""
         check_fields(self, SCALING)
         shapes = {self.offsets.shape, self.scales.shape}
         if shapes != {(n_channels,)}:
             raise MotionError(f"scaling: offsets and scales do not match {n_channels} channels")
 
-    def says(self, other: Scaling | None) -> bool:
+    def equals(self, other: Scaling | None) -> bool:
         """Return True if both scale alike."""
         if other is None:
             return False
@@ -49,27 +49,27 @@ class Scaling:
         return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
     def values(self, stored: Values, channels: slice | list[int] = slice(None)) -> Floats:
-        """Stored numbers, (n_rows, n_channels), in units; ``channels`` says which these are."""
-        with np.errstate(over="ignore", invalid="ignore"):  # files say what they like
+        """Stored numbers, (n_rows, n_channels), in units; ``channels`` indexes the columns."""
+        with np.errstate(over="ignore", invalid="ignore"):  # files may have any numbers
             moved = stored.astype(np.float64) - self.offsets[channels]
             scaled: Floats = moved * self.scales[channels] * self.general
         return scaled
 
     def stored(self, values: Values, numbers: Values) -> Values:
-        """The stored numbers that mean ``values``: ``numbers``, but where a value is another.
+        """Stored numbers of ``values``: ``numbers``, replaced where a value differs.
 
-        What is new is the number that means it or, among integers, the nearest one; NaN or 0 where
-        no number means it.
+        The replacement is the number of the value or, among integers, the nearest one; NaN or 0
+        where no number has this value.
         """
-        meant = self.values(numbers)
-        same = (meant == values) | (np.isnan(meant) & np.isnan(values))
-        if same.all():
+        current = self.values(numbers)
+        is_unchanged = (current == values) | (np.isnan(current) & np.isnan(values))
+        if is_unchanged.all():
             return numbers
         with np.errstate(all="ignore"):
             new = np.asarray(values, np.float64) / (self.scales * self.general) + self.offsets
         if numbers.dtype == np.int64:
             new = np.clip(np.rint(np.nan_to_num(new)), -MAX_INTEGER, MAX_INTEGER)
-        return np.where(same, numbers, new.astype(numbers.dtype))
+        return np.where(is_unchanged, numbers, new.astype(numbers.dtype))
 
 
 _NUMBERS = array_of("i8", 1, "int64 of one dimension")
@@ -95,7 +95,7 @@ class Exceptions:
         return len(self.texts)
 
     def moved(self, columns: Ints) -> Exceptions:
-        """The same where channel k has become ``columns[k]``; those of -1 are left out."""
+        """The same with column ``columns[k]`` for channel k; channels with -1 are left out."""
         if not len(self):
             return self
         channels = columns[self.channels]

@@ -1,4 +1,4 @@
-"""Compiled: a count of the ways in which tokens are written, from which grids are guessed."""
+"""Compiled: counts of the notations of tokens, which suggest grids."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from mcz.model.numbers.kernels import (
     ZERO_INTEGER,
 )
 
-MOST_DECIMALS = 63  # counted apart
+MOST_DECIMALS = 63  # larger numbers of decimals are counted as this
 MOST_DIGITS = 31
 
-# What is counted in ``Survey.styles``.
+# Indices of ``Survey.styles``.
 SIGNED, UNSIGNED = 0, 1  # a plus sign, and no sign at all
 BARE_INTEGER, NO_ZERO = 2, 3  # "0.5", ".5"
 POINT_ONLY, NO_POINT, POINT_ZERO = 4, 5, 6  # integral numbers: "5.", "5", "5.0"
@@ -36,7 +36,7 @@ N_STYLES = 13
 class Survey(NamedTuple):
     """Counts of numbers by decimals, of those without an exponent, and by digits.
 
-    ``styles``: how many are written in each of the ways above.
+    ``styles``: counts of the notations above.
     """
 
     decimals: Ints
@@ -46,7 +46,7 @@ class Survey(NamedTuple):
 
 @kernel
 def count(fields: Ints2, step: int, n_counted: int, survey: Survey) -> None:
-    """Count so many of the tokens, a step apart and again from the first ones on."""
+    """Count ``n_counted`` of the tokens, ``step`` apart, cyclically."""
     decimals, significant, styles = survey
     step %= max(1, len(fields))
     token = -step

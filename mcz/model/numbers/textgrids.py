@@ -12,7 +12,7 @@ from mcz.model.types import Bools, Floats, Ints
 
 _UNLIMITED = 1_000_000  # more decimals, and a larger exponent, than any number has
 WIDEST = 48  # bytes of a number from ``write``; the longest has 17 digits after "-0.00000"
-_JAVASCRIPT = 1  # digits of a TEXT64 grid
+_JAVASCRIPT = 1  # the ``digits`` of a TEXT64 grid that prints as JavaScript does
 
 
 def exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
@@ -34,9 +34,9 @@ def exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
 def match(
     tokens: Tokens, kind: GridKind, digits: int, flags: int, allowed: int | None = None
 ) -> tuple[Ints, Bools, int]:
-    """(ordinals, printed, number not printed); of TEXT grids only the shape is checked.
+    """(ordinals, mask of the tokens that the grid prints exactly so, count of the others).
 
-    Where more than ``allowed`` are not printed, what follows is not looked at.
+    Of TEXT grids only the shape is checked. Stops after more than ``allowed`` misses.
     """
     general, low, high = exponents(kind, digits)
     trim = kind != GridKind.FIXED and digits < FIXED_TEXT
@@ -54,19 +54,19 @@ def match(
 def uncertain(tokens: Tokens, kind: GridKind, digits: int, printed: Bools) -> Bools:
     """Mask of the tokens that need an exact check; ``printed`` are those of the right shape.
 
-    A number of 15 digits (6 in binary32) that is no subnormal is its own shortest text.
+    A normal number of 15 digits (6 in binary32) is its own shortest text.
     """
     loops = kernels()
     power, shape = tokens.fields[:, 1], tokens.fields[:, 2]
     digits_kept, far = (6, 30) if kind == GridKind.TEXT32 else (15, 290)
     if digits > _JAVASCRIPT:
-        return printed | long(tokens)
+        return printed | too_long(tokens)
     many: Bools = (shape >> loops.SIGNIFICANT & 31) > digits_kept
     many |= np.abs(power) > far
-    return (printed & many) | long(tokens)
+    return (printed & many) | too_long(tokens)
 
 
-def long(tokens: Tokens) -> Bools:
+def too_long(tokens: Tokens) -> Bools:
     """Mask of the numbers with more digits than a match examines."""
     loops = kernels()
     result: Bools = tokens.fields[:, 2] & (loops.LONG | loops.BAD | loops.SPECIAL) == loops.LONG
@@ -81,10 +81,10 @@ def token_ordinals32(tokens: Tokens) -> Ints:
 
 
 def texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negative: Bools) -> Texts:
-    """Print the numbers of these magnitudes; they have been checked against the limit."""
+    """Print the numbers of these magnitudes, which are already within the limit."""
     general, low, high = exponents(kind, digits)
     if kind == GridKind.TEXT64 and digits >= FIXED_TEXT:  # TEXT-01
-        return _joined(magnitudes.view(np.float64), negative, digits - FIXED_TEXT)
+        return _fixed_texts(magnitudes.view(np.float64), negative, digits - FIXED_TEXT)
     if general == 0:
         mantissas, fractions = magnitudes, np.full(len(magnitudes), digits)
     elif kind == GridKind.GENERAL:
@@ -100,7 +100,7 @@ def texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negative: B
 
 
 def float_digits(kind: GridKind, digits: int, magnitudes: Ints) -> tuple[Ints, Ints]:
-    """(mantissas, decimals) of the text of binary floats: shortest, or so many digits."""
+    """(mantissas, decimals) of binary floats: the fewest digits that read back, or fixed."""
     if kind == GridKind.TEXT32:
         words = magnitudes.astype(np.uint32).view(np.float32)
         tokens = scan_texts([str(value) for value in words])
@@ -120,7 +120,7 @@ def text32_values(magnitudes: Ints) -> Floats:
     return values[inverse].reshape(magnitudes.shape)
 
 
-def _joined(values: Floats, negative: Bools, decimals: int) -> Texts:
+def _fixed_texts(values: Floats, negative: Bools, decimals: int) -> Texts:
     pairs = zip(values.tolist(), negative.tolist(), strict=True)
     lines = [f"-{x:.{decimals}f}" if minus else f"{x:.{decimals}f}" for x, minus in pairs]
     offsets = np.concatenate(([0], np.cumsum([len(line) for line in lines], dtype=np.int64)))

@@ -1,4 +1,4 @@
-"""Numbers in text: where they stand, how they are written, which binary64 they are.
+"""Numbers in text: their place, their notation, their binary64.
 
 SPEC.md, "Decimal and binary64", is normative for ``nearest``.
 """
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mcz.errors import SourceError
 from mcz.model.types import Bools, Floats, Ints
 
-NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the one NaN that values hold
+NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the only NaN in values
 EXACT_POWER = 22  # 10^22 is the last power of ten that a binary64 holds exactly
 TENS = np.array([float(f"1e{power}") for power in range(EXACT_POWER + 1)])
 
@@ -54,16 +54,16 @@ class Texts:
         if same_length and np.array_equal(self.buffer, other.buffer):
             return np.ones(len(self), np.bool_)
         sizes = np.diff(self.offsets)
-        same: Bools = sizes == np.diff(other.offsets)
-        chosen = np.flatnonzero(same & (sizes > 0))
+        is_equal: Bools = sizes == np.diff(other.offsets)
+        chosen = np.flatnonzero(is_equal & (sizes > 0))
         if len(chosen):
             n = sizes[chosen]
             first = np.cumsum(n) - n
             within = np.arange(first[-1] + n[-1]) - np.repeat(first, n)
             mine = self.buffer[within + np.repeat(self.offsets[chosen], n)]
             theirs = other.buffer[within + np.repeat(other.offsets[chosen], n)]
-            same[chosen] = ~np.logical_or.reduceat(mine != theirs, first)
-        return same
+            is_equal[chosen] = ~np.logical_or.reduceat(mine != theirs, first)
+        return is_equal
 
     def tolist(self) -> list[bytes]:
         whole = self.buffer.tobytes()
@@ -73,7 +73,7 @@ class Texts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tokens:
-    """Tokens ``text[start[i]:stop[i]]`` and, in ``fields`` (n, 3), how each is written.
+    """Tokens ``text[start[i]:stop[i]]`` and, in ``fields`` (n, 3), the notation of each.
 
     Indexing with a slice, a mask or an array of indices gives the Tokens chosen.
     """
@@ -82,7 +82,7 @@ class Tokens:
     start: Ints
     stop: Ints
     fields: Ints  # columns as in mcz.model.numbers.kernels
-    known: list[Floats] = field(default_factory=list, repr=False)  # the values, once they are asked
+    known: list[Floats] = field(default_factory=list, repr=False)  # the values, once computed
 
     def __len__(self) -> int:
         return len(self.start)
@@ -90,7 +90,7 @@ class Tokens:
     def __getitem__(self, index: Any) -> Tokens:
         if isinstance(index, int | np.integer):
             raise TypeError("a single token is a slice of one, or token(i)")
-        fields = np.ascontiguousarray(self.fields[index])  # the rest is seldom looked at
+        fields = np.ascontiguousarray(self.fields[index])  # start and stop are copied on use
         known = [values[index] for values in self.known]
         return Tokens(self.text, self.start[index], self.stop[index], fields, known)
 
@@ -106,12 +106,12 @@ class Tokens:
         return Texts(self.text[indices], offsets)
 
     def bad(self) -> Bools:
-        """Mask of the tokens that are no numbers; nan and inf are numbers here."""
+        """Mask of the tokens that are not numbers; nan and inf are numbers here."""
         result: Bools = (self.fields[:, 2] & kernels().BAD) != 0
         return result
 
     def values(self) -> Floats:
-        """The nearest binary64 of each token; SourceError names the first that is no number."""
+        """The nearest binary64 of each token; SourceError names the first that is not a number."""
         if not self.known:
             self.known.append(self._values())
         return self.known[0].copy()
@@ -121,8 +121,8 @@ class Tokens:
         out, slow = np.empty(len(self)), np.zeros(len(self), np.bool_)
         if not loops.values(self.fields, TENS, out, slow):
             return out
-        odd = np.flatnonzero(slow)
-        hard = self[odd]
+        slow_tokens = np.flatnonzero(slow)
+        hard = self[slow_tokens]
         bad = np.flatnonzero(hard.bad())
         if len(bad):
             first = int(bad[0])
@@ -131,7 +131,9 @@ class Tokens:
             )
         special = hard.fields[:, 2] & loops.SPECIAL != 0
         texts = zip(hard.texts().tolist(), special.tolist(), strict=True)
-        out[odd] = [_value(text) if is_special else float(text) for text, is_special in texts]
+        out[slow_tokens] = [
+            _value(text) if is_special else float(text) for text, is_special in texts
+        ]
         return out
 
 
@@ -142,7 +144,7 @@ def scan(
 ) -> Tokens:
     """Describe the tokens ``text[start[i]:stop[i]]`` of a buffer; a view of it is kept."""
     whole = text.view() if isinstance(text, np.ndarray) else np.frombuffer(text, np.uint8)
-    whole.flags.writeable = False  # nobody writes to it
+    whole.flags.writeable = False  # the view is read-only
     start = np.ascontiguousarray(start, np.int64)
     stop = np.ascontiguousarray(stop, np.int64)
     if len(start) != len(stop) or (
@@ -160,14 +162,14 @@ def scan(
 
 
 def scan_texts(texts: Sequence[str]) -> Tokens:
-    """Tokens of texts that stand by themselves."""
+    """Tokens of separate texts."""
     stop = np.cumsum([len(text) + 1 for text in texts], dtype=np.int64)
     start = np.concatenate(([0], stop))[:-1]
     return scan(" ".join((*texts, "")).encode(), start, stop - 1)
 
 
 def values_of_texts(texts: Sequence[bytes]) -> tuple[Floats, Bools]:
-    """The values of texts that stand by themselves, and which are no numbers at all (value 0)."""
+    """The values of separate texts, and a mask of texts that are not numbers (value 0)."""
     stop = np.cumsum([len(text) + 1 for text in texts], dtype=np.int64)
     start = np.concatenate(([0], stop))[:-1]
     tokens = scan(b" ".join((*texts, b"")), start, stop - 1)
@@ -178,7 +180,7 @@ def values_of_texts(texts: Sequence[bytes]) -> tuple[Floats, Bools]:
 
 
 def _value(text: bytes, fallback: float | None = None) -> float:
-    """The binary64 of one token, by exact conversion; ``fallback`` for what is no number."""
+    """The binary64 of one token, by exact conversion; ``fallback`` if it is not a number."""
     if _NAN_TEXT.fullmatch(text):
         return float(NAN)
     if _INF_TEXT.fullmatch(text):
@@ -196,7 +198,7 @@ def nearest(mantissa: Ints, power: Ints) -> Floats:
 
 
 def scale(mantissa: Ints, power: Ints) -> tuple[Floats, Bools]:
-    """``mantissa * 10^power`` in binary64, and where that may not be the nearest.
+    """``mantissa * 10^power`` in binary64, and a mask of results that may not be the nearest.
 
     One product or quotient of two exact factors is correctly rounded: they are exact where the
     mantissa is at most 2^53 and the power at most 22 either way.

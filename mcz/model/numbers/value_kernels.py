@@ -12,7 +12,7 @@ from mcz.model.numbers.rules import MIN_POWER
 DIGITS, POWER, LIMIT = range(3)
 RULE_SIZE = 3
 FIXED, OTHER = 0, -1  # digits of a grid of fixed decimals; of one that is not decimal
-ROWS = 256  # that are worked on at a time, so that they stay in the processor's memory
+ROWS = 256  # rows a pass, so that they stay in the processor's cache
 EXACT_POWER = 22
 NONE = 1 << 62  # above all magnitudes
 
@@ -54,9 +54,9 @@ def values_of_general(
 
 @kernel
 def fill_values(ordinals: Ints2, rules: Ints2, tens: Floats, values: Floats2, left: Ints) -> None:
-    """Fill ``values`` (rows, channels) with those of the ordinals; ``left``: channels not filled.
+    """Fill ``values`` (rows, channels) from the ordinals; ``left``: channels not filled.
 
-    These have another grid than a decimal one, or a number that no exact division gives, or none.
+    Their grid is not decimal, or a number has no exact quotient, or an ordinal has no number.
     """
     for start in range(0, len(ordinals), ROWS):
         stop = min(start + ROWS, len(ordinals))
@@ -77,13 +77,13 @@ def fill_values(ordinals: Ints2, rules: Ints2, tens: Floats, values: Floats2, le
                     values[t, c] = -value if ordinals[t, c] < 0 else value
 
 
-LEAST_POWER, GREATEST_POWER = -324, 308  # of ten, in the table of powers
+LEAST_POWER, GREATEST_POWER = -324, 308  # powers of ten in the table
 
 
 def power_of(value: float, power: int, powers: Floats) -> int:
     """The power of ten of the first digit of a value above 0.
 
-    The search begins at ``power``; ``powers`` are all of them, from ``LEAST_POWER`` on.
+    The search begins at ``power``; ``powers`` is the table, from ``LEAST_POWER`` on.
     """
     while value < powers[power - LEAST_POWER]:
         power -= 1
@@ -128,9 +128,9 @@ def ordinals_of_general(
     ordinals: Ints2,
     exact: Bytes2,
 ) -> bool:
-    """Numbers of so many significant digits; False where one is to be looked at more closely."""
+    """Numbers of so many significant digits; False where one needs a closer look."""
     low, high = tens[digits - 1], tens[digits]
-    power = shift = since = 0  # since: what magnitudes exceed mantissas by
+    power = shift = since = 0  # since: excess of magnitudes over mantissas
     ten = 1.0
     least = above = 0.0  # sizes of that power of ten, of the number before
     for t in range(start, stop):
@@ -141,7 +141,7 @@ def ordinals_of_general(
                 ordinals[t, c] = -1 if 1.0 / value < 0.0 else 0
                 exact[t, c] = 1
                 continue
-            if not size < powers[GREATEST_POWER - LEAST_POWER]:  # nor is that NaN
+            if not size < powers[GREATEST_POWER - LEAST_POWER]:  # NaN too
                 return False
             power = power_of(size, power, powers)
             least, above = powers[power - LEAST_POWER], powers[power + 1 - LEAST_POWER]
@@ -168,7 +168,7 @@ def ordinals_of_fixed(
     ordinals: Ints2,
     exact: Bytes2,
 ) -> bool:
-    """Numbers of so many decimals; False where one is beyond the grid or none."""
+    """Numbers of so many decimals; False where one is beyond the grid or NaN."""
     ten = tens[rule[POWER]]
     for t in range(start, stop):
         value = values[t, c]
@@ -194,10 +194,10 @@ def fill_ordinals(
     exact: Bytes2,
     left: Ints,
 ) -> None:
-    """Fill ``ordinals`` (rows, channels), and where they give the values back ``exact`` with 1.
+    """Fill ``ordinals`` (rows, channels), and ``exact`` with 1 where they restore the values.
 
-    ``left``: channels not filled, which have another grid than a decimal one, or a value that no
-    exact product or quotient gives.
+    ``left``: channels not filled. Their grid is not decimal, or a value has no exact product or
+    quotient.
     """
     for start in range(0, len(values), ROWS):
         stop = min(start + ROWS, len(values))

@@ -29,7 +29,7 @@ def values_of(
 ) -> Floats:
     """The binary64 of each ordinal, (rows, channels); see ``Signal.grid_changes``.
 
-    As ``Grid.values`` gives them, and refuses them. They go to ``out`` where that is given.
+    Values and errors are those of ``Grid.values``. ``out``, if given, receives them.
     """
     values = np.empty(ordinals.shape) if out is None else np.asarray(out, np.float64)
     if not changes and ordinals.flags.c_contiguous:
@@ -37,7 +37,7 @@ def values_of(
         if not lacks_compiled_kernels():
             left[:] = 0
             _kernels("value").fill_values(ordinals, _rules(tuple(grids)), TENS, values, left)
-        for grid, columns in _left(left, grids):
+        for grid, columns in _unfilled_channels(left, grids):
             values[:, columns] = grid.values(ordinals[:, columns])
         return values
     for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):
@@ -46,9 +46,9 @@ def values_of(
 
 
 def ordinals_of(values: Values, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
-    """The ordinal of each value, (rows, channels), and whether it gives exactly this value back.
+    """The ordinal of each value, (rows, channels), and whether it restores exactly this value.
 
-    As ``Grid.ordinals`` finds them.
+    Results equal those of ``Grid.ordinals``.
     """
     values = np.ascontiguousarray(values, np.float64)
     ordinals, exact = np.empty(values.shape, np.int64), np.empty(values.shape, np.uint8)
@@ -56,7 +56,7 @@ def ordinals_of(values: Values, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
     _kernels("value").fill_ordinals(
         values, _rules(tuple(grids)), TENS, POWERS, ordinals, exact, left
     )
-    for grid, columns in _left(left, grids):
+    for grid, columns in _unfilled_channels(left, grids):
         ordinals[:, columns], exact[:, columns] = grid.ordinals(values[:, columns])
     return ordinals, exact.view(np.bool_)
 
@@ -66,8 +66,8 @@ def print_values(
 ) -> Bytes:
     """The texts of the numbers nearest to values, (rows, channels), on their decimal grids.
 
-    ``start``, counted from ``base``, and ``size`` say where each lies, but not of other grids,
-    of values beyond their grid, and of those that no product or quotient of tens gives.
+    ``start``, counted from ``base``, and ``size`` locate each, except on other grids, for values
+    beyond their grid, and where no product or quotient of tens is exact.
     """
     loops = _kernels("print")
     rules = {grid: _print_rule(grid) for grid in dict.fromkeys(grids)}
@@ -88,11 +88,13 @@ def _print_rule(grid: Grid) -> tuple[int, ...]:
     return digits, grid.digits, grid.limit, trim, *exponents, grid.flags, 0
 
 
-def _left(left: Ints, grids: Sequence[Grid]) -> Iterator[tuple[Grid, list[int]]]:
-    """The channels that a compiled loop left, by grid."""
-    others = np.flatnonzero(left).tolist()
-    for grid in dict.fromkeys(grids[c] for c in others):
-        yield grid, [c for c in others if grids[c] == grid]
+def _unfilled_channels(
+    is_unfilled: Ints, grids: Sequence[Grid]
+) -> Iterator[tuple[Grid, list[int]]]:
+    """The channels that a compiled loop did not fill, by grid."""
+    channels = np.flatnonzero(is_unfilled).tolist()
+    for grid in dict.fromkeys(grids[c] for c in channels):
+        yield grid, [c for c in channels if grids[c] == grid]
 
 
 @lru_cache(maxsize=64)

@@ -1,7 +1,7 @@
 """The layer of structures: records over construct, and the types that the format adds.
 
-``records`` declares, parses and builds them, ``types`` has what construct lacks, varints and raw
-deflate. SPEC.md, "Conventions", is normative.
+``records`` declares, parses and builds them, ``types`` adds types that construct lacks, varints and
+raw deflate. SPEC.md, "Conventions", is normative.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mcz.model.schema.types import TEXT as TEXT
 from mcz.model.schema.types import UVARINT as UVARINT
 from mcz.model.schema.types import Adapted as Adapted
 from mcz.model.schema.types import Checked as Checked
-from mcz.model.schema.types import CheckedBeside as CheckedBeside
+from mcz.model.schema.types import CheckedInRecord as CheckedInRecord
 from mcz.model.schema.types import Exactly as Exactly
 from mcz.model.schema.types import bounded as bounded
 from mcz.model.schema.types import counted as counted

@@ -1,7 +1,7 @@
-"""Tables of records, stored by columns: a count, then the values of each field one after the other.
+"""Tables of records, stored by columns: a count, then the values of each field.
 
-A column of varints or of bytes is read in bulk by NumPy; its type is that of the field, which the
-record declares. SPEC.md, "Conventions", is normative.
+NumPy reads a column of varints or of bytes in bulk; the record declares the type of each field.
+SPEC.md, "Conventions", is normative.
 """
 
 from __future__ import annotations
@@ -35,22 +35,24 @@ Item: TypeAlias = int | bytes | str
 Row: TypeAlias = tuple[Item, ...]
 
 MOST_BYTES = 8  # of a varint
-FEW = 8  # varints, which Python reads sooner than NumPy
+FEW_VARINTS = 8  # up to so many varints Python reads sooner than NumPy
 
 
 class Table(Sequence[R], Generic[R]):
-    """The records of a table; ``column`` has the values of a field, a record is made when asked."""
+    """The records of a table; ``column`` has the values of a field; records are built on access."""
 
     def __init__(self, record: type[R], columns: dict[str, Column], count: int) -> None:
         self.record, self.columns, self.n_rows = record, columns, count
 
     @classmethod
     def of(cls, record: type[R], rows: Sequence[Row]) -> Table[R]:
-        """The table of rows, each of which has the values of the fields in their order."""
+        """The table of rows, each with the values of the fields in their order."""
         names = [name for name, _ in cast(RecordType, as_construct(record)).rows]
         columns = zip(*rows, strict=True) if rows else [()] * len(names)
-        made = {name: _as_column(values) for name, values in zip(names, columns, strict=True)}
-        return cls(record, made, len(rows))
+        columns_by_name = {
+            name: _as_column(values) for name, values in zip(names, columns, strict=True)
+        }
+        return cls(record, columns_by_name, len(rows))
 
     def numbers(self, name: str) -> Numbers:
         """The column of a field of numbers."""
@@ -193,12 +195,12 @@ def _piece(data: np.ndarray, at: int, size: int) -> np.ndarray:
 
 def read_varints(data: np.ndarray, at: int, count: int) -> tuple[Numbers, int]:
     """The ``count`` varints at ``at``, and where they end; raises FormatError."""
-    if count <= FEW:
-        few, found, end = data[at : at + MOST_BYTES * count].tobytes(), [], 0
+    if count <= FEW_VARINTS:
+        first_bytes, few, end = data[at : at + MOST_BYTES * count].tobytes(), [], 0
         for _ in range(count):
-            value, end = read_varint(few, end)
-            found.append(value)
-        return np.array(found, np.int64), at + end
+            value, end = read_varint(first_bytes, end)
+            few.append(value)
+        return np.array(few, np.int64), at + end
     if count > len(data) - at:  # CONV-13
         raise TruncatedError(f"{count} varints run past the end")
     short = data[at : at + count]
@@ -258,4 +260,4 @@ def build_column(kind: construct.Construct, values: Column) -> bytes:
     return build_varints(cast(Numbers, values))
 
 
-columns = Columns  # as the fields of records have it
+columns = Columns  # the name of the type in declarations of records

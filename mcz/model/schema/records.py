@@ -11,10 +11,10 @@
     parse(Head, payload, "HEAD").major
     build(Head(major=1), "HEAD")
 
-The type after the colon is that of the value; the first argument of ``field`` is how construct
+The annotation is the type of the value; the first argument of ``field`` is how construct
 reads and writes it, with its bounds; the second is its meaning in the table of SPEC.md. ``parse``
-and ``build`` are the one door to construct: what it refuses becomes an error of ours that names
-the field and the value. SPEC.md, "Conventions", is normative.
+and ``build`` are the only calls of construct: its errors become errors of ours that name the
+field and the value. SPEC.md, "Conventions", is normative.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ import construct
 from construct.core import CodeGen
 
 from mcz.errors import FormatError, MczError, TruncatedError
-from mcz.model.schema.types import CheckedBeside, Exactly, Kind, as_construct, field_path
+from mcz.model.schema.types import CheckedInRecord, Exactly, Kind, as_construct, field_path
 
-COMPILED_FROM = 4096  # bytes from which a schema is worth compiling, some milliseconds
-# What a value raises that is none of a field: of another type, too large, not there.
+COMPILED_FROM = 4096  # bytes from which compiling a schema, some milliseconds, is worthwhile
+# Errors of values that do not fit their field: of another type, too large, missing.
 NO_VALUE = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, struct.error)
 
 
@@ -52,7 +52,7 @@ def field(kind: Kind, docs: str, *, default: Any = dataclasses.MISSING) -> Any:
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(field,))
 class Record:
-    """A structure of the format; its fields are those of its subclass, given by keyword."""
+    """A structure of the format; its subclass has its fields, given by keyword."""
 
     def __init_subclass__(cls) -> None:
         dataclasses.dataclass(kw_only=True)(cls)
@@ -66,7 +66,7 @@ class Record:
     @classmethod
     @cache
     def compiled_type(cls, before: str | None = None) -> construct.Construct:
-        """The same, compiled: it reads faster, and does not know which field is at fault."""
+        """The same, compiled: faster, but its errors do not name the field."""
         return RecordType(cls, before).compile()
 
 
@@ -75,7 +75,7 @@ T = TypeVar("T")
 
 
 class RecordType(construct.Adapter):
-    """Construct's Struct of the fields of ``record``, whose values are records."""
+    """Construct's Struct of the fields of ``record``, with records as values."""
 
     def __init__(self, record: type[Record], before: str | None = None) -> None:
         self.record, self.is_whole = record, before is None
@@ -83,8 +83,8 @@ class RecordType(construct.Adapter):
         self.rows = list(takewhile(lambda row: row[0] != before, rows))
         super().__init__(construct.Struct(*(name / item for name, item in self.rows)))
 
-    def made(self, **values: object) -> Record:
-        """The record of these values; of the first fields alone, the others are not there."""
+    def make_record(self, **values: object) -> Record:
+        """The record of these values; with ``before``, the other fields are missing."""
         if self.is_whole:
             return self.record(**values)
         record = object.__new__(self.record)
@@ -92,14 +92,14 @@ class RecordType(construct.Adapter):
         return record
 
     def _decode(self, obj: construct.Container, context: construct.Container, path: str) -> Record:
-        return self.made(**{name: obj[name] for name, _ in self.rows})
+        return self.make_record(**{name: obj[name] for name, _ in self.rows})
 
     def _encode(self, obj: Record, context: construct.Container, path: str) -> dict[str, object]:
         return {name: getattr(obj, name) for name, _ in self.rows}
 
     def _emitparse(self, code: CodeGen) -> str:
-        """Emit a function that reads the fields, with a context of theirs where one is needed."""
-        code.linkedinstances[id(self)] = self.record if self.is_whole else self.made
+        """Emit a function that reads the fields, with a context of its own if needed."""
+        code.linkedinstances[id(self)] = self.record if self.is_whole else self.make_record
         lines = [f"def parse_{id(self)}(io, this):"]
         has_context = any(_looks_back(item) for _, item in self.rows)
         if has_context:
@@ -115,33 +115,32 @@ class RecordType(construct.Adapter):
 
 
 def _looks_back(item: construct.Construct) -> bool:
-    """Return whether a type needs the fields before it."""
     if isinstance(item, Exactly):
         return callable(item.length)
-    return isinstance(item, construct.IfThenElse | CheckedBeside)
+    return isinstance(item, construct.IfThenElse | CheckedInRecord)
 
 
 def parse(record: type[R], data: bytes, where: str, limits: Mapping[str, int] | None = None) -> R:
     """The record of ``data``, all of which it must consume.
 
-    ``limits`` says how many items of some kinds, see ``Counted``, there may be in all. Raises
+    ``limits``: greatest total numbers of items of some kinds, see ``Counted``. Raises
     TruncatedError, LimitError or FormatError; ``where`` opens the message.
     """
 
     def read(schema: construct.Construct) -> R:
         stream = BytesIO(data)
-        found = schema.parse_stream(stream, left=dict(limits or {}))
+        result = schema.parse_stream(stream, left=dict(limits or {}))
         if stream.tell() < len(data):  # CONV-12
             raise FormatError(f"{len(data) - stream.tell()} bytes behind its end")
-        return cast(R, found)
+        return cast(R, result)
 
     return _read(read, record, where, compiled=len(data) >= COMPILED_FROM)
 
 
 def parse_until(record: type[R], data: bytes, where: str, before: str) -> R:
-    """The record of ``data`` with the fields before ``before`` alone; the others are not there.
+    """The record of ``data`` with the fields before ``before`` alone; the others are missing.
 
-    For a look at many records. Raises what ``parse`` does of these fields.
+    For a quick pass over many records. Raises as ``parse``.
     """
 
     def read(schema: construct.Construct) -> R:
@@ -151,13 +150,13 @@ def parse_until(record: type[R], data: bytes, where: str, before: str) -> R:
 
 
 def parse_all(record: type[R], data: bytes, where: str) -> list[R]:
-    """The records that ``data`` is, one behind the other; raises what ``parse`` does."""
+    """The records that ``data`` consists of; raises as ``parse``."""
 
     def read(schema: construct.Construct) -> list[R]:
-        stream, found = BytesIO(data), []
+        stream, result = BytesIO(data), []
         while stream.tell() < len(data):
-            found.append(schema.parse_stream(stream))
-        return found
+            result.append(schema.parse_stream(stream))
+        return result
 
     return _read(read, record, where, compiled=len(data) >= COMPILED_FROM)
 
@@ -175,7 +174,7 @@ def _read(
         try:
             return read(record.compiled_type(before))
         except (MczError, construct.ConstructError, *NO_VALUE):
-            pass  # the plain one knows which field is at fault
+            pass  # errors of the plain one name the field
     with _our_errors(where):
         return read(record.construct_type(before))
 
@@ -188,7 +187,7 @@ def build(record: Record, where: str) -> bytes:
 
 @contextmanager
 def _our_errors(where: str) -> Iterator[None]:
-    """Turn errors of construct into ours, which say the field at fault."""
+    """Turn errors of construct into ours, which name the faulty field."""
     try:
         yield
     except construct.StreamError as error:  # CONV-13

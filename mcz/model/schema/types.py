@@ -1,6 +1,6 @@
 """Types of fields that the format has and construct lacks, as classes of construct.
 
-Numbers, arrays, ``If`` and ``this`` are construct's own. Its types that accept malformed bytes are
+Numbers, arrays, ``If`` and ``this`` come from construct. Its types that accept malformed bytes are
 not used: ``GreedyRange``, ``Enum``, ``Flag``, ``Padding``, ``VarInt``, ``Compressed``. Varints and
 raw deflate serve bulk data too. SPEC.md, "Conventions", is normative.
 """
@@ -37,7 +37,7 @@ def varint(value: int) -> bytes:
 
 
 def take_varint(source: Iterable[int], where: str) -> int:
-    """The varint that the bytes of ``source`` begin with; no more of them are taken."""
+    """The varint at the start of ``source``, which is advanced past it."""
     value = shift = 0
     for byte in source:
         value |= (byte & 0x7F) << shift
@@ -103,7 +103,7 @@ class Sized(construct.Construct):
 
 
 class Text(Sized):
-    """UTF-8 behind a varint length."""
+    """UTF-8 after a varint length."""
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:  # type: ignore[override]
         data = super()._parse(stream, context, path)
@@ -143,7 +143,7 @@ class Checked(construct.Adapter):
         return f"linkedinstances[{id(self)}]._decode({value}, this, '')"
 
 
-class CheckedBeside(Checked):
+class CheckedInRecord(Checked):
     """The same with a test of the value and the fields before it in its record."""
 
     def _decode(self, obj: object, context: Container, path: str) -> object:
@@ -155,7 +155,7 @@ class CheckedBeside(Checked):
 
 
 class Adapted(construct.Adapter):
-    """A value that ``decode`` makes of another one; ``encode`` undoes it."""
+    """A value that ``decode`` makes of another one; ``encode`` is its inverse."""
 
     def __init__(
         self, kind: Kind, decode: Callable[[Any], Any], encode: Callable[[Any], Any]
@@ -180,7 +180,7 @@ class Adapted(construct.Adapter):
 class Counted(Subconstruct):
     """A varint count of at most ``most``, then that many items.
 
-    ``kind`` names the items where ``parse`` may be given a limit of how many there are in all.
+    ``kind`` names the items if ``parse`` may limit their total number.
     """
 
     def __init__(self, item: Kind, most: int = MAX_COUNT, kind: str = "") -> None:
@@ -242,7 +242,7 @@ class Optional(construct.Adapter):
 
 
 def only_if(condition: object, item: Kind) -> Construct:
-    """An item that is there only where the condition holds: None, or the value."""
+    """An item that is present only where the condition holds; otherwise None."""
     return construct.If(condition, as_construct(item))
 
 
@@ -252,21 +252,21 @@ def one_of(kind: Kind, values: Collection[object]) -> Checked:
 
 
 def bounded(kind: Kind, least: float, most: float) -> Checked:
-    """A number from ``least`` to ``most``; NaN is none."""
+    """A number from ``least`` to ``most``, not NaN."""
     return Checked(kind, lambda value: least <= value <= most)
 
 
 def flags(*names: str, extended: bool = False) -> Checked:
-    """One byte of flags, bit 0 first; the bits without a name are reserved and must be 0.
+    """One byte of flags, bit 0 first; bits without a name are reserved and must be 0.
 
-    ``extended``: bit 7 says that the structure has an extension.
+    ``extended``: bit 7 means that the structure has an extension.
     """
     known = (1 << len(names)) - 1 | extended * EXTENDED
     return Checked(construct.Int8ul, lambda value: not value & ~known)  # CONV-14
 
 
 def as_construct(kind: Kind) -> Construct:
-    """A construct type; that of a record where ``kind`` is one."""
+    """A construct type, also from a record."""
     return getattr(kind, "construct_type", lambda: kind)()
 
 
@@ -276,7 +276,7 @@ def field_path(path: str) -> str:
 
 
 def _longer(first: bytes, stream: BinaryIO, path: str) -> int:
-    """A varint that ``first`` begins and that does not end with it."""
+    """A varint of several bytes that begins with ``first``."""
     if not first:
         raise construct.StreamError("0 of 1 bytes left", path=path)
     more = iter(lambda: stream_read(stream, 1, path)[0], None)
@@ -287,29 +287,29 @@ def _write(stream: BinaryIO, data: bytes, path: str) -> None:
     stream_write(stream, data, len(data), path)
 
 
-counted, optional = Counted, Optional  # as the fields of records have them
+counted, optional = Counted, Optional  # names of the types in declarations of records
 UVARINT = Varint()
 SVARINT = Adapted(UVARINT, lambda n: n >> 1 ^ -(n & 1), lambda n: 2 * n if n >= 0 else -2 * n - 1)
 SIZED = Sized()
 TEXT = Text()
 # CONV-10
 EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kept on rewriting
-EXTENDED = 0x80  # in the flags of a structure: it has an extension, which is sized
+EXTENDED = 0x80  # flag of a structure with an extension, which is sized
 SIZED_EXTENSION = construct.If(construct.this.flags & EXTENDED, SIZED)
 FINITE = Checked(Float64l, lambda value: value - value == 0)  # SKEL-08
 POSITIVE = Checked(UVARINT, lambda value: value >= 1)
 
 
-MAX_RATIO = 1032  # raw deflate never inflates to more than this times its size
+MAX_RATIO = 1032  # raw deflate never inflates by more than this factor
 
 
 def inflate(data: bytes, size: int, where: str, *, words: bytes = b"") -> bytes:
-    """The ``size`` bytes whose raw deflate is ``data``; never more memory than ``size`` + 1.
+    """The ``size`` bytes whose raw deflate is ``data``; never uses more memory than ``size`` + 1.
 
-    ``words``: bytes that distances may reach back to, as if they came before.
+    ``words``: a dictionary that distances may reach back to.
     """
     if size > MAX_RATIO * (len(data) + 1):  # LIMIT-14
-        raise LimitError(f"{size} bytes cannot come of {len(data)}", where=where)
+        raise LimitError(f"{len(data)} bytes cannot inflate to {size}", where=where)
     inflater = zlib.decompressobj(-15, words)  # CONV-19
     try:
         out = inflater.decompress(data, size + 1)
@@ -322,6 +322,6 @@ def inflate(data: bytes, size: int, where: str, *, words: bytes = b"") -> bytes:
 
 
 def deflate(data: bytes, *, words: bytes = b"") -> bytes:
-    """The raw deflate of ``data``, which may refer to ``words``."""
+    """The raw deflate of ``data`` with the dictionary ``words``."""
     deflater = zlib.compressobj(9, zlib.DEFLATED, -15, 9, zlib.Z_DEFAULT_STRATEGY, words)
     return deflater.compress(data) + deflater.flush()

@@ -14,31 +14,31 @@ from mcz.kinematics.frames import FramePoses, frame_poses_of
 from mcz.kinematics.points import listed_points
 from mcz.kinematics.retargeting.sides import sides_of
 from mcz.model.motion import Skeleton
+from mcz.model.types import Ints
 
-Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 MIDDLE, LEFT, RIGHT = 0, 1, 2
-_EYE = re.compile(r"eye|jaw|tongue", re.IGNORECASE)  # in a head, where a ball is drawn
+_EYE = re.compile(r"eye|jaw|tongue", re.IGNORECASE)  # in a head, which is drawn as a ball
 _SIDES = {"": MIDDLE, "left": LEFT, "right": RIGHT}
-THICK = 0.042  # radius of a bone, of the figure's size, from whose start it is that far to the tip
+THICK = 0.042  # radius of a bone, of the figure's size, from a start at that distance from the tip
 SHORT = 0.45  # of its length, how thick a bone may be
 THIN = 0.010  # of the figure's size, which it may be in any case
-TRUNK = 1.5  # how much thicker the trunk is than other bones
+TRUNK = 1.5  # thickness of the trunk relative to other bones
 HEAD = 0.052  # radius of a head, of the figure's size
 DOT = 0.011  # radius of a marker, of the extent of all
-STEM = 0.3  # of the figure's size: a longer bone from a root to its only child is no part of it
-LEAST = 1e-3  # of the figure's size: a shorter bone has no length
-RUBBER = 0.5  # of its length: a bone that varies as much is none
+STEM = 0.3  # of the figure's size: a longer bone from a root to its only child is not part of it
+LEAST_LENGTH = 1e-3  # of the figure's size: a shorter bone has no length
+MOST_VARIATION = 0.5  # of its length: a bone that varies as much is none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """Nodes of a skeleton and what joins them.
+    """Nodes of a skeleton and the bones between them.
 
     Nodes are the origins of all joints, then all tails. ``bones`` (n, 2) are nodes, start and end;
-    ``sides`` (n_nodes,) MIDDLE, LEFT or RIGHT; ``joints`` (n_nodes,) whose node it is. ``lone`` are
-    the nodes that are drawn as dots: markers, and joints with no bone.
+    ``sides`` (n_nodes,) MIDDLE, LEFT or RIGHT; ``joints`` (n_nodes,) the joint of each node.
+    ``lone`` are the nodes drawn as dots: markers, and joints without a bone.
     """
 
     skeleton: Skeleton
@@ -55,7 +55,7 @@ class Body:
         return np.unique(np.concatenate([self.bones.ravel(), self.lone]))
 
     def places(self, values: Floats) -> Floats:
-        """Places of the nodes, (n_frames, n_nodes, 3) in length units, NaN where unknown."""
+        """Positions of the nodes, (n_frames, n_nodes, 3) in length units, NaN where unknown."""
         poses: FramePoses = frame_poses_of(self.skeleton)
         joints = list(range(self.skeleton.n_joints))
         with np.errstate(all="ignore"):
@@ -66,10 +66,10 @@ class Body:
 
 
 def body_of(skeleton: Skeleton) -> Body:
-    """The body of a skeleton in any pose; ``fitted`` leaves out what is no bone."""
+    """The body of a skeleton in any pose; ``fitted`` removes false bones."""
     tails = [(n, joint) for n, (joint, tail) in enumerate(listed_points(skeleton)) if tail >= 0]
     n_joints, bones = skeleton.n_joints, []
-    offsets: dict[int, list[Floats]] = {}  # of an Acclaim bone its end is where the next ones begin
+    offsets: dict[int, list[Floats]] = {}  # an Acclaim bone ends where the next ones begin
     for joint, of in enumerate(skeleton.joints):
         if of.parent >= 0:
             bones.append((of.parent, joint))
@@ -89,14 +89,14 @@ def body_of(skeleton: Skeleton) -> Body:
 
 
 def _heads(skeleton: Skeleton, bones: Ints, owners: Ints) -> Ints:
-    """The bones that end in a head: of those of that name in a row the last."""
+    """The bones that end in a head: of a row of that name the last."""
     named = np.array(["head" in joint.name.lower() for joint in skeleton.joints], bool)[owners]
     going_on = bones[named[bones[:, 1]], 0]
     return np.flatnonzero(named[bones[:, 1]] & ~np.isin(bones[:, 1], going_on))
 
 
 def fitted(body: Body, places: Floats) -> Body:
-    """``body`` without what is no bone in these frames: stems from a root, rubber, no length.
+    """``body`` without false bones in these frames: stems from a root, varying or zero lengths.
 
     ``places`` (n_frames, n_nodes, 3), at least one frame.
     """
@@ -110,8 +110,8 @@ def fitted(body: Body, places: Floats) -> Body:
     only = (parents[starts] < 0) & (counts[starts] == 1) & (ends < n_joints)
     size = size_of(np.delete(places, starts[only], axis=1))
     with np.errstate(invalid="ignore"):
-        rubber = (high - low > RUBBER * usual) & (usual > 0.1 * size)
-        kept = ~rubber & (usual > LEAST * size)
+        rubber = (high - low > MOST_VARIATION * usual) & (usual > 0.1 * size)
+        kept = ~rubber & (usual > LEAST_LENGTH * size)
         stem = only & (usual > STEM * size)
     if (kept & ~stem).any():
         kept &= ~stem
@@ -123,23 +123,23 @@ def fitted(body: Body, places: Floats) -> Body:
 
 
 def _quantile(values: Floats, q: float) -> Floats:
-    """Quantile of the known values of every column; NaN for none."""
+    """Quantile of the known values of every column; NaN without any."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        found: Floats = np.nanquantile(values, q, axis=0)
-    return found
+        result: Floats = np.nanquantile(values, q, axis=0)
+    return result
 
 
 def bone_lengths(body: Body, places: Floats) -> Floats:
     """Lengths of the bones, (n_frames, n_bones), NaN where unknown."""
     with np.errstate(all="ignore"):
         apart = places[:, body.bones[:, 1]] - places[:, body.bones[:, 0]]
-        found: Floats = np.sqrt((apart**2).sum(axis=2))
-    return np.where(np.isfinite(found), found, np.nan)
+        lengths: Floats = np.sqrt((apart**2).sum(axis=2))
+    return np.where(np.isfinite(lengths), lengths, np.nan)
 
 
 def size_of(places: Floats) -> float:
-    """The usual extent of all nodes of a frame, along the axis where it is greatest; 1.0 of none.
+    """The usual extent of all nodes of a frame, along its greatest axis; 1.0 without nodes.
 
     Nodes that are ten times as far from the middle as others do not count.
     """
@@ -153,7 +153,7 @@ def size_of(places: Floats) -> float:
 
 
 def near_others(nodes: Floats) -> Flags:
-    """Flags of the nodes of a frame, (n, 3), that are known and not far off all others."""
+    """Flags of the nodes of a frame, (n, 3), that are known and not far from all others."""
     known = known_places(nodes)
     if not known.any():
         return known
@@ -171,7 +171,7 @@ def known_places(places: Floats) -> Flags:
 def radii(body: Body, places: Floats, size: float) -> Floats:
     """Radii of each bone at its start and end, (n_bones, 2), in the unit of ``places``.
 
-    As branches of a tree are: by the root of how far it is to the farthest tip.
+    As branches of a tree: proportional to the root of the distance to the farthest tip.
     """
     lengths = np.nan_to_num(_quantile(bone_lengths(body, places), 0.5))
     reach = np.zeros(len(body.joints))
@@ -179,15 +179,15 @@ def radii(body: Body, places: Floats, size: float) -> Floats:
         start, end = body.bones[bone]
         reach[start] = max(reach[start], reach[end] + lengths[bone])
     ahead = reach[body.bones[:, 1]]
-    found: Floats = THICK * np.sqrt(np.stack([ahead + lengths, ahead], axis=1) * size)
-    found[_trunk(body, ahead, size)] *= TRUNK
-    found = np.minimum(found, (SHORT * lengths + THIN * size)[:, None])
-    found[:, 1] = np.maximum(found[:, 1], 0.45 * found[:, 0])
-    return np.maximum(found, 0.5 * THIN * size)
+    result: Floats = THICK * np.sqrt(np.stack([ahead + lengths, ahead], axis=1) * size)
+    result[_trunk(body, ahead, size)] *= TRUNK
+    result = np.minimum(result, (SHORT * lengths + THIN * size)[:, None])
+    result[:, 1] = np.maximum(result[:, 1], 0.45 * result[:, 0])
+    return np.maximum(result, 0.5 * THIN * size)
 
 
 def _trunk(body: Body, ahead: Floats, size: float) -> Flags:
-    """Flags of the trunk's bones: between the sides, with arms or more still to come."""
+    """Flags of the trunk's bones: between the sides, before arms or further bones."""
     sides = body.sides[body.bones[:, 1]]
     return np.asarray((sides == MIDDLE) & (ahead > 0.28 * size) & bool((sides == LEFT).any()))
 

@@ -1,4 +1,4 @@
-"""Charts of bytes: where those of a clip go, and what error how many of them leave."""
+"""Charts of bytes: the parts of a clip, and bytes against errors."""
 
 from __future__ import annotations
 
@@ -23,33 +23,33 @@ from mcz.kinematics.metrics import Comparison, compare
 from mcz.kinematics.metrics.sums import times
 from mcz.model.motion import Motion
 from mcz.show.pictures.canvases import Theme, library, rgb
-from mcz.show.pictures.charts import Chart, Sheet, legend, name_ticks, rows_of, styled
+from mcz.show.pictures.charts import Chart, Sheet, legend, name_ticks, rows_of, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-OTHER = "exceptions, masks"  # what is no codec's
+OTHER = "exceptions, masks"  # bytes outside of the codec
 LONGEST = 44  # letters of the joints of a group
 MOST_BARS = 32  # groups that have a bar of their own
 WIDTH = 1000
 STEPS = (1 / 16, 1 / 4, 1.0, 2.0, 4.0, 16.0)  # of a middling setting of the dial
-MIDDLING_CM = 0.1  # mean error that a dial is first set for
+MIDDLING_CM = 0.1  # mean error for the first setting of a dial
 FIGURES = ("mean_position_error", "max_position_error")
 
 
-Sort = int | None  # a resolution; None: what is no codec's
+Sort = int | None  # a resolution; None: outside of the codec
 Parts = dict[Sort, int]  # bytes
 
 
 def bytes_chart(clip: Clip) -> Chart:
     """The payload of a clip by group of channels and resolution; figures of ``mcz info``."""
     groups = by_group(byte_shares(clip))
-    found = {sort for own in groups.values() for sort in own}
-    sorts = sorted(found, key=lambda sort: (sort is None, sort))
+    present_sorts = {sort for own in groups.values() for sort in own}
+    sorts = sorted(present_sorts, key=lambda sort: (sort is None, sort))
     total = sum(sum(own.values()) for own in groups.values())
     ordered = sorted(groups.items(), key=lambda each: -sum(each[1].values()))
-    if len(groups) == 1 and len(sorts) > 1:  # of one group its resolutions are what differs
+    if len(groups) == 1 and len(sorts) > 1:  # of a single group the resolutions are shown
         ((_, own),) = ordered
         bars: list[tuple[str, Parts]] = [(called(sort), {sort: own[sort]}) for sort in sorts]
     else:
@@ -77,7 +77,7 @@ def called(sort: Sort) -> str:
 def _draw_bars(
     figure: Figure, theme: Theme, *, bars: Sequence[tuple[str, Parts]], sorts: Sequence[Sort]
 ) -> None:
-    axes = styled(figure.subplots(), theme, x="bytes")
+    axes = style(figure.subplots(), theme, x="bytes")
     places, left = np.arange(len(bars))[::-1], np.zeros(len(bars))
     ramp = _ramp(theme, sorts)
     for sort in sorts:
@@ -92,7 +92,6 @@ def _draw_bars(
 
 
 def _with_rest(ordered: Sequence[tuple[str, Parts]]) -> list[tuple[str, Parts]]:
-    """The greatest, and all others as one."""
     shown, rest = list(ordered[:MOST_BARS]), ordered[MOST_BARS:]
     if rest:
         sums: Parts = {}
@@ -104,14 +103,14 @@ def _with_rest(ordered: Sequence[tuple[str, Parts]]) -> list[tuple[str, Parts]]:
 
 
 def _ramp(theme: Theme, sorts: Sequence[Sort]) -> dict[Sort, Any]:
-    """Colors: resolutions from strong to pale, what is no codec's in another."""
+    """Colors: resolutions from strong to pale, other parts in another color."""
     strong, pale = np.array(rgb(theme.series[0])), np.array(rgb(theme.grid))
     levels = [sort for sort in sorts if sort is not None]
-    found: dict[Sort, Any] = dict.fromkeys(sorts, theme.series[1])
+    colors: dict[Sort, Any] = dict.fromkeys(sorts, theme.series[1])
     for number, sort in enumerate(levels):
         share = 0.8 * number / max(1, len(levels) - 1)
-        found[sort] = tuple(strong * (1 - share) + pale * share)
-    return found
+        colors[sort] = tuple(strong * (1 - share) + pale * share)
+    return colors
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,12 +128,12 @@ def rate_chart(
 ) -> Chart:
     """Bytes and errors of ``motion`` at a few settings of lossy codecs.
 
-    Raises OptionError for a codec that has nothing to turn, and where no setting could be tried.
+    Raises OptionError for a codec without a dial, and if no setting worked.
     """
     points: list[_Point] = []
     for place, name in enumerate(codecs):
-        told = partial(_told, progress, place, len(codecs))
-        points += _points(motion, name, told)
+        report = partial(_report_setting, progress, place, len(codecs))
+        points += _points(motion, name, report)
     known = motion.skeleton.unit_cm
     factor, unit = (10.0 * known, "mm") if known is not None else (1.0, "units")
     rows: list[list[object]] = [["codec", "setting", "bytes", f"mean {unit}", f"greatest {unit}"]]
@@ -152,7 +151,7 @@ def rate_chart(
     return Chart(title, (WIDTH, 460), draw, (table,))
 
 
-def _told(
+def _report_setting(
     progress: Callable[[int, int, str], None], place: int, count: int, step: int, what: str
 ) -> None:
     progress(place * len(STEPS) + step, count * len(STEPS), what)
@@ -163,7 +162,7 @@ def _draw_rates(
 ) -> None:
     for axes, key in zip(figure.subplots(1, 2), FIGURES, strict=True):
         word = "mean" if key.startswith("mean") else "greatest"
-        styled(axes, theme, x="bytes", y=f"{word} position error, {unit}")
+        style(axes, theme, x="bytes", y=f"{word} position error, {unit}")
         for place, name in enumerate(dict.fromkeys(point.codec for point in points)):
             own = [(p.n_bytes, getattr(p.figures, key)) for p in points if p.codec == name]
             pairs = [(n_bytes, error * factor) for n_bytes, error in own if error]
@@ -182,17 +181,17 @@ def _plain_ticks(axes: Axes) -> None:
         axis.set_minor_formatter(ticker.NullFormatter())
 
 
-def _points(motion: Motion, name: str, told: Callable[[int, str], None]) -> list[_Point]:
-    """A point for each setting that works; raises OptionError where none does."""
+def _points(motion: Motion, name: str, report: Callable[[int, str], None]) -> list[_Point]:
+    """A point for each setting that works; raises OptionError if none does."""
     codec = codec_by_name(name)
     if codec.dial is None:
         raise OptionError(f"codec {name} has nothing to turn: it is lossless, or has one setting")
     points, why = [], ""
     for step, setting in enumerate(_settings(codec.dial)):
         text = f"{codec.dial.parameter}={setting:.4g}"
-        told(step, f"{name} {text}")
+        report(step, f"{name} {text}")
         try:
-            points.append(_Point(name, text, *_tried(motion, codec, setting)))
+            points.append(_Point(name, text, *_try_setting(motion, codec, setting)))
         except MczError as error:
             why = str(error)
     if not points:
@@ -201,14 +200,12 @@ def _points(motion: Motion, name: str, told: Callable[[int, str], None]) -> list
 
 
 def _settings(dial: Dial) -> list[float]:
-    """Settings of a dial around a middling one."""
     middle = (dial.guess and dial.guess("mean_error_cm", MIDDLING_CM)) or 1.0
     settings = [min(max(middle * step, dial.low), dial.high) for step in STEPS]
     return list(dict.fromkeys(max(1, round(s)) if dial.whole else s for s in settings))
 
 
-def _tried(motion: Motion, codec: Codec, setting: float) -> tuple[int, Comparison]:
-    """Bytes and figures of the motion at a setting, as the public reader has them."""
+def _try_setting(motion: Motion, codec: Codec, setting: float) -> tuple[int, Comparison]:
     assert codec.dial is not None
     alone = replace(motion, signals=motion.signals[:1], source=None, metadata={})
     params = {codec.dial.parameter: setting}

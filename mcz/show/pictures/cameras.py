@@ -10,7 +10,7 @@ import numpy as np
 from mcz.errors import OptionError
 from mcz.kinematics.chain import Floats
 
-# Degrees: how far round from the front towards its right side, and how far up.
+# Degrees: around from the front towards its right side, and up.
 VIEWS = {
     "front": (0.0, 6.0),
     "side": (90.0, 6.0),
@@ -18,7 +18,7 @@ VIEWS = {
     "three-quarter": (40.0, 16.0),
 }
 FIELD = math.radians(24.0)  # of view, from bottom to top
-NEAR = 0.05  # of its distance: what is nearer to the camera is not drawn
+NEAREST = 0.05  # of its distance: nearer parts are not drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,19 +45,19 @@ class Camera:
         """Pixels of a length at a distance of the same length."""
         return self.view.height / (2 * math.tan(FIELD / 2))
 
-    def seen(self, places: Floats) -> tuple[Floats, Floats]:
-        """Pixels (..., 2) of places (..., 3), and pixels a unit of length there, NaN behind it."""
+    def project(self, places: Floats) -> tuple[Floats, Floats]:
+        """Pixels (..., 2) of places (..., 3), and pixels a unit of length there, NaN behind."""
         with np.errstate(all="ignore"):
             x, y, back = np.moveaxis((places - self.target) @ self.axes.T, -1, 0)
             ahead = self.distance - back
-            scale = np.where(ahead > NEAR * self.distance, self.zoom / ahead, np.nan)
+            scale = np.where(ahead > NEAREST * self.distance, self.zoom / ahead, np.nan)
             center_x = self.view.left + self.view.width / 2
             center_y = self.view.bottom + self.view.height / 2
             pixels = np.stack([center_x + x * scale, center_y + y * scale], axis=-1)
         return pixels, scale
 
     def at(self, target: Floats) -> Camera:
-        """The same camera, moved so that it looks at ``target``."""
+        """The same camera, moved to look at ``target``."""
         return Camera(self.axes, target, self.distance, self.view)
 
 
@@ -78,7 +78,7 @@ def axes_of(view: str, forward: Floats) -> Floats:
 
 
 def framed(axes: Floats, low: Floats, high: Floats, view: Viewport) -> Camera:
-    """The camera that just sees a box, whose corners are given along its own axes, (3,) each."""
+    """The camera that exactly frames a box, whose corners are along its own axes, (3,) each."""
     middle = (low + high) / 2
     half = np.maximum((high - low) / 2, 1e-9)
     zoom = view.height / (2 * math.tan(FIELD / 2))

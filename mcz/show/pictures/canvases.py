@@ -1,4 +1,4 @@
-"""A picture of lines, polygons and words, which matplotlib draws: as pixels or as SVG."""
+"""A picture of lines, polygons and words, drawn by matplotlib as pixels or as SVG."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Drawing:
 
 
 class Canvas:
-    """Draws pictures of one size, one after the other; what they are made of is kept."""
+    """Draws pictures of one size, one after the other; its artists are kept."""
 
     def __init__(self, width: int, height: int, theme: Theme) -> None:
         collections = library("matplotlib.collections")
@@ -96,8 +96,8 @@ class Canvas:
         with quietly():
             canvas = self._figure.canvas
             canvas.draw()
-            found = np.asarray(getattr(canvas, "buffer_rgba")())[:, :, :3]  # noqa: B009 - of Agg's
-        return np.ascontiguousarray(found)
+            image = np.asarray(getattr(canvas, "buffer_rgba")())[:, :, :3]  # noqa: B009 - of Agg's
+        return np.ascontiguousarray(image)
 
     def svg(self, stream: BinaryIO, title: str) -> None:
         """The picture as SVG."""
@@ -111,13 +111,13 @@ PACKAGES = {"PIL": "pillow", "av": "av (PyAV)"}
 
 
 def library(name: str) -> ModuleType:
-    """The module ``name``; OptionError that names the extra of mcz where it is not installed."""
+    """Import the module ``name``; OptionError names the extra of mcz if it is missing."""
     top = name.partition(".")[0]
     return import_extra(name, EXTRAS[top], package=PACKAGES.get(top, top), purpose="this picture")
 
 
 def new_figure(width: int, height: int, **options: object) -> Figure:
-    """A matplotlib figure of so many pixels, apart from every global state of pyplot."""
+    """A matplotlib figure of so many pixels, without the global state of pyplot."""
     library("matplotlib")
     canvas = library("matplotlib.backends.backend_agg")
     figure: Figure = library("matplotlib.figure").Figure(
@@ -133,7 +133,7 @@ SVG = {"svg.fonttype": "path", "svg.hashsalt": "mcz", "axes.unicode_minus": Fals
 
 @contextmanager
 def quietly() -> Iterator[None]:
-    """Draw letters that the font lacks as boxes, without a word, and SVG the same every time."""
+    """Draw letters that the font lacks as boxes, without a warning, and reproducible SVG."""
     matplotlib = library("matplotlib")
     with warnings.catch_warnings(), matplotlib.rc_context(SVG):
         warnings.filterwarnings("ignore", message="Glyph .* missing")

@@ -1,4 +1,4 @@
-"""Bones as the eye sees them: tapered capsules as polygons, in the order of their depth."""
+"""Bones as tapered capsules: polygons in the order of their depth."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mcz.kinematics.chain import Floats
-from mcz.show.pictures.bodies import DOT, HEAD, Ints
+from mcz.model.types import Ints
+from mcz.show.pictures.bodies import DOT, HEAD
 from mcz.show.pictures.cameras import Camera
 from mcz.show.pictures.canvases import Theme, rgb
 from mcz.show.pictures.tracks import Track
 
 ARC = np.linspace(0.0, 1.0, 15)  # along the round end of a capsule
-LIGHT = np.array([-0.42, 0.62])  # where on the picture the light comes from
+LIGHT = np.array([-0.42, 0.62])  # direction of the light on the picture
 EDGE = 0.9  # pixels of an outline
-FAR = 0.38  # how much of the ground's color the farthest has
-SUN = np.array([0.22, 0.30])  # how far shadows reach sideways, of the height above the floor
-MOST = 4.0  # picture widths off the middle: what is farther is not drawn
+FOG = 0.38  # share of the ground's color in the farthest parts
+SUN = np.array([0.22, 0.30])  # sideways reach of shadows, per height above the floor
+MOST_WIDTHS = 4.0  # picture widths off the middle: farther parts are not drawn
 
 
 @dataclass(slots=True)
@@ -53,8 +54,8 @@ def capsules(a: Floats, b: Floats, ra: Floats, rb: Floats) -> Floats:
 
 def _round(center: Floats, radius: Floats, angles: Floats) -> Floats:
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=2)
-    found: Floats = center[:, None] + radius[:, None, None] * circle
-    return found
+    points: Floats = center[:, None] + radius[:, None, None] * circle
+    return points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +71,7 @@ class Pieces:
 
 
 def pieces_of(track: Track, nodes: Floats, colors: Floats) -> Pieces:
-    """Make the pieces to draw of a frame, whose nodes and their colors are (n_nodes, 3)."""
+    """The pieces of a frame, whose nodes and their colors are (n_nodes, 3)."""
     body = track.body
     starts, ends = nodes[body.bones[:, 0]], nodes[body.bones[:, 1]]
     dots = nodes[body.lone]
@@ -90,9 +91,9 @@ def pieces_of(track: Track, nodes: Floats, colors: Floats) -> Pieces:
 
 
 def _heads(track: Track, starts: Floats, ends: Floats) -> tuple[Floats, Floats, Floats]:
-    """The heads as long balls: where they begin, where they end, how thick they are.
+    """The heads as long balls: their starts, ends and radii.
 
-    A bone that ends in a tail is inside of its head, one that ends in a joint leads to it.
+    A bone that ends in a tail is inside its head, one that ends in a joint leads to it.
     """
     heads, bulk = track.body.heads, HEAD * track.size
     along = ends[heads] - starts[heads]
@@ -106,9 +107,9 @@ def _heads(track: Track, starts: Floats, ends: Floats) -> tuple[Floats, Floats, 
 
 
 def add_figure(shapes: Shapes, camera: Camera, pieces: Pieces, theme: Theme, size: float) -> None:
-    """The figure, what is far first; each piece as its outline, itself and a light on it."""
-    a, scale_a = camera.seen(pieces.starts)
-    b, scale_b = camera.seen(pieces.ends)
+    """Add the figure, farthest pieces first; each as its outline, itself and a light on it."""
+    a, scale_a = camera.project(pieces.starts)
+    b, scale_b = camera.project(pieces.ends)
     ra, rb = pieces.start_radii * scale_a, pieces.end_radii * scale_b
     near = _drawable(camera, a, b)
     with np.errstate(invalid="ignore"):
@@ -119,7 +120,7 @@ def add_figure(shapes: Shapes, camera: Camera, pieces: Pieces, theme: Theme, siz
         return
     a, b, ra, rb = a[near], b[near], np.maximum(ra[near], 0.8), np.maximum(rb[near], 0.8)
     span = size * camera.zoom / camera.distance**2  # how much scales differ across a figure
-    haze = np.clip((depth.max() - depth[order]) / max(span, 1e-12), 0, 1)[:, None] * FAR
+    haze = np.clip((depth.max() - depth[order]) / max(span, 1e-12), 0, 1)[:, None] * FOG
     ground = np.array(rgb(theme.ground))
     body = pieces.colors[near] * (1 - haze) + ground * haze
     dark, light = body * 0.62, body + (1 - body) * 0.38
@@ -136,12 +137,12 @@ def add_figure(shapes: Shapes, camera: Camera, pieces: Pieces, theme: Theme, siz
 def add_shadow(shapes: Shapes, camera: Camera, pieces: Pieces, floor: float, theme: Theme) -> None:
     """The shadow on the floor, in one color."""
     flat = []
-    sun = SUN if pieces.has_bones else np.zeros(2)  # that of markers is below them
+    sun = SUN if pieces.has_bones else np.zeros(2)  # shadows of markers are below them
     for places in (pieces.starts, pieces.ends):
         rise = np.maximum(places[:, 2:] - floor, 0.0)
         flat.append(np.concatenate([places[:, :2] + rise * sun, np.full_like(rise, floor)], axis=1))
-    a, scale_a = camera.seen(flat[0])
-    b, scale_b = camera.seen(flat[1])
+    a, scale_a = camera.project(flat[0])
+    b, scale_b = camera.project(flat[1])
     near = _drawable(camera, a, b)
     tilt = max(0.1, float(camera.axes[2, 2]))  # a circle on the floor is flat
     radii = (pieces.start_radii * scale_a, pieces.end_radii * scale_b)
@@ -152,10 +153,10 @@ def add_shadow(shapes: Shapes, camera: Camera, pieces: Pieces, floor: float, the
 
 
 def _drawable(camera: Camera, a: Floats, b: Floats) -> Ints:
-    """Indices of pieces in front of the camera and not far off the picture."""
+    """Indices of pieces in front of the camera and not far outside of the picture."""
     view = camera.view
     middle = (view.left + view.width / 2, view.bottom + view.height / 2)
-    most = MOST * max(view.width, view.height)
+    most = MOST_WIDTHS * max(view.width, view.height)
     with np.errstate(invalid="ignore"):
         inside = (np.abs(np.stack([a, b]) - middle) < most).all(axis=(0, 2))
     return np.flatnonzero(inside)

@@ -1,4 +1,4 @@
-"""Charts of one joint: its channels over time, and what frequencies they and its speed have."""
+"""Charts of one joint: its channels over time, and the spectra of channels and speed."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from mcz.kinematics.poses.motion_like import signal_of
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal
 from mcz.model.text_format import among, printable
 from mcz.show.pictures.canvases import Theme
-from mcz.show.pictures.charts import Chart, Sheet, legend, line, rows_of, styled
+from mcz.show.pictures.charts import Chart, Sheet, legend, line, rows_of, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WIDTH, PANEL = 1000, 280  # pixels of a chart and the height of a panel
-LONGEST = 1024  # frames of a piece whose spectrum is taken
+LONGEST = 1024  # frames of a piece of a spectrum
 MOST_SERIES = 8  # of a signal's channels, unless they are chosen
 MOST_RUNS = 400  # between gaps: of more one line is drawn
-LEAST = 8  # frames that have one
-DEEP = 1e-8  # of the greatest power: what is less is not shown
+LEAST_FRAMES = 8  # frames for a spectrum
+DEEP = 1e-8  # of the greatest power: less is not shown
 LEAST_POWER = 1e-290
 
 
@@ -51,10 +51,12 @@ def length_unit(motion: Motion) -> str:
 
 
 def joint_of(motion: Motion, joint: int | str | None) -> tuple[int, str, tuple[Channel, ...]]:
-    """Index, name and channels of a joint, None: the first that has any; raises MotionError."""
+    """Index, name and channels of a joint, None: the first with channels; raises MotionError."""
     skeleton = motion.skeleton
     if not motion.signals[0].has_poses:
-        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
+        raise MotionError(
+            "the channels of its motion signal differ from those of its skeleton", clip=motion.name
+        )
     having = [index for index, each in enumerate(skeleton.joints) if each.channels]
     if not having:
         raise MotionError("no joint has channels", clip=motion.name)
@@ -66,8 +68,7 @@ def joint_of(motion: Motion, joint: int | str | None) -> tuple[int, str, tuple[C
 
 
 def times_of(motion: Motion, first: int, signal: int = 0) -> tuple[Floats, str]:
-    """The times of the rows of a signal in seconds, or in frames of the clip where that is unknown;
-    what to write beside it."""
+    """The times of the rows of a signal in seconds, or in frames of the clip if unknown; label."""
     chosen, timeline = motion.signals[signal], motion.timeline
     if timeline is None:
         return first + np.arange(chosen.n_rows) / chosen.samples_per_frame, "frame"
@@ -75,8 +76,8 @@ def times_of(motion: Motion, first: int, signal: int = 0) -> tuple[Floats, str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """Whose numbers: a ``joint``, or ``channels`` of a ``signal``, by name; None: the first."""
+class Selection:
+    """A ``joint``, or ``channels`` of a ``signal``, by name; None: the first."""
 
     joint: int | str | None = None
     signal: int | str | None = None
@@ -85,7 +86,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Series:
-    """Numbers over ``at``, what they are and what they are in; a panel for each unit."""
+    """Numbers over ``at``, their name and unit; a panel for each unit."""
 
     label: str
     unit: str
@@ -95,9 +96,9 @@ class _Series:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """The series of a chart, of which ``runs`` of rows have no gap between.
+    """The series of a chart; ``runs`` of rows have no break in time.
 
-    ``joint`` is theirs, None of a signal's channels. ``when`` names ``at``.
+    ``joint`` is theirs, None for a signal's channels. ``when`` labels ``at``.
     """
 
     name: str
@@ -109,8 +110,8 @@ class _Shown:
     notes: tuple[str, ...] = ()
 
 
-def _shown(motion: Motion, wanted: Wanted, first: int) -> _Shown:
-    index = _signal_of(motion, wanted)
+def _shown(motion: Motion, selection: Selection, first: int) -> _Shown:
+    index = _signal_of(motion, selection)
     signal, timeline = motion.signals[index], motion.timeline
     at, when = times_of(motion, first, index)
     values = np.asarray(signal.masked(), np.float64)
@@ -118,11 +119,11 @@ def _shown(motion: Motion, wanted: Wanted, first: int) -> _Shown:
     joint: int | None = None
     notes: tuple[str, ...] = ()
     if signal.channels is None:
-        joint, name, channels = joint_of(motion, wanted.joint)
+        joint, name, channels = joint_of(motion, selection.joint)
         columns: Sequence[int] = motion.skeleton.columns(joint)
     else:
         name, every = signal.name, signal.channels
-        columns, notes = _columns(every, wanted.channels, name)
+        columns, notes = _columns(every, selection.channels, name)
         channels = tuple(every[k] for k in columns)
     series = [
         _Series(
@@ -138,17 +139,19 @@ def _shown(motion: Motion, wanted: Wanted, first: int) -> _Shown:
     return _Shown(name, joint, series, when, rows or [(0, 0)], per_frame, notes)
 
 
-def _signal_of(motion: Motion, wanted: Wanted) -> int:
-    """The index of a signal: that which has the channels, or is asked for; else the motion, or,
-    where that has no channels, the first other signal. Raises OptionError."""
-    if wanted.signal is None and wanted.channels is None:
-        is_empty = not motion.signals[0].n_channels and wanted.joint is None
+def _signal_of(motion: Motion, selection: Selection) -> int:
+    """The index of a signal: the one with the channels, or the requested one; else the motion.
+
+    If the motion has no channels, the first other signal. Raises OptionError.
+    """
+    if selection.signal is None and selection.channels is None:
+        is_empty = not motion.signals[0].n_channels and selection.joint is None
         return int(is_empty and len(motion.signals) > 1)
-    if wanted.joint is not None:
+    if selection.joint is not None:
         raise OptionError("a chart is of a joint or of channels of a signal, not of both")
-    if wanted.signal is not None:
-        return motion.signals.index(signal_of(motion, wanted.signal))
-    names = set(wanted.channels or ())
+    if selection.signal is not None:
+        return motion.signals.index(signal_of(motion, selection.signal))
+    names = set(selection.channels or ())
     having = [k for k, signal in enumerate(motion.signals) if names <= {*_labels(signal.channels)}]
     if not having:
         known = [label for signal in motion.signals for label in _labels(signal.channels)]
@@ -162,23 +165,23 @@ def _labels(channels: Sequence[Channel] | None) -> list[str]:
 
 
 def _columns(
-    channels: Sequence[Channel], wanted: Sequence[str] | None, signal: str
+    channels: Sequence[Channel], names: Sequence[str] | None, signal: str
 ) -> tuple[list[int], tuple[str, ...]]:
-    """The columns of these names, None: of the first; and what to say of the others."""
+    """The columns of these names, None: of the first; and a remark on the others."""
     labels = _labels(channels)
-    if wanted is None:
+    if names is None:
         more = Remark(f"{MOST_SERIES} of {len(labels)} channels", Hint.SERIES)
         return list(range(len(labels)))[:MOST_SERIES], (more,) * (len(labels) > MOST_SERIES)
-    for name in wanted:
+    for name in names:
         if name not in labels:
             shown = among(labels, name)
             raise OptionError(f"signal {signal!r} has no channel {name!r}, but {shown}")
-    return [labels.index(name) for name in wanted], ()
+    return [labels.index(name) for name in names], ()
 
 
-def channel_chart(motion: Motion, wanted: Wanted, first: int = 0) -> Chart:
+def channel_chart(motion: Motion, selection: Selection, first: int = 0) -> Chart:
     """Channels over time; ``first`` is the frame of the clip where the motion begins."""
-    shown = _shown(motion, wanted, first)
+    shown = _shown(motion, selection, first)
     rows: list[list[object]] = [["channel", "in", "least", "mean", "greatest", "unknown"]]
     for each in shown.series:
         known = each.numbers[np.isfinite(each.numbers)]
@@ -194,11 +197,11 @@ def channel_chart(motion: Motion, wanted: Wanted, first: int = 0) -> Chart:
 def _panels(
     figure: Figure, theme: Theme, series: Sequence[_Series], x: str, y: str
 ) -> Iterator[tuple[Axes, list[_Series]]]:
-    """Axes for each unit, one below the other, and what is drawn there."""
+    """Axes for each unit, one below the other, and their series."""
     units = list(dict.fromkeys(each.unit for each in series))
     every = np.atleast_1d(figure.subplots(len(units), 1, sharex=True))
     for axes, unit in zip(every, units, strict=True):
-        styled(axes, theme, y=y.format(unit=unit), x=x if unit == units[-1] else "")
+        style(axes, theme, y=y.format(unit=unit), x=x if unit == units[-1] else "")
         own = [each for each in series if each.unit == unit]
         yield axes, own
         legend(axes, theme, loc="upper right", ncols=len(own))
@@ -218,7 +221,7 @@ def draw_runs(
     label: str,
     **options: object,
 ) -> None:
-    """A line through the points of each run of rows, none over the gaps between."""
+    """A line through the points of each run of rows, broken between runs."""
     for start, stop in runs if len(runs) <= MOST_RUNS else [(0, len(points[0]))]:
         at, numbers = (each[start:stop] for each in points)
         line(axes, at, numbers, color, label if start == runs[0][0] else "", **options)
@@ -228,12 +231,11 @@ def _color(theme: Theme, place: int) -> str:
     return theme.series[place % len(theme.series)]
 
 
-def spectrum_chart(motion: Motion, wanted: Wanted) -> Chart:
-    """The power spectral densities of channels, and of a joint's speed where that is known.
+def spectrum_chart(motion: Motion, selection: Selection) -> Chart:
+    """The power spectral densities of channels, and of a joint's speed if known.
 
-    By Welch's method; unknown values are bridged straight, whole turns taken out. Where frames are
-    missing, those of the longest part between two gaps. Raises MotionError where there are too few
-    frames.
+    By Welch's method; unknown values are bridged straight, whole turns removed. If frames are
+    missing, of the longest part between two breaks in time. Raises MotionError for too few frames.
     """
     notes: tuple[str, ...] = ()
     runs = [(0, motion.n_frames)] if motion.timeline is None else motion.timeline.runs
@@ -241,9 +243,9 @@ def spectrum_chart(motion: Motion, wanted: Wanted) -> Chart:
         start, stop = max(runs, key=lambda run: run[1] - run[0])
         notes = (f"frames {start}:{stop} alone, the longest part without a gap",)
         motion = motion.cut(start, stop)
-    if motion.n_frames < LEAST:
+    if motion.n_frames < LEAST_FRAMES:
         what = f"a spectrum of {motion.n_frames} frames"
-        raise MotionError(f"{what}; {LEAST} are needed", clip=motion.name)
+        raise MotionError(f"{what}; {LEAST_FRAMES} are needed", clip=motion.name)
     period = None if motion.timeline is None else motion.timeline.period
     turned = motion
     if motion.signals[0].has_poses and motion.skeleton.n_channels:
@@ -251,10 +253,10 @@ def spectrum_chart(motion: Motion, wanted: Wanted) -> Chart:
         values = Unwrapper(motion.skeleton)(np.asarray(first.masked(), np.float64))
         mended = Signal(values, name=first.name, samples_per_frame=first.samples_per_frame)
         turned = replace(motion, signals=(mended, *motion.signals[1:]), source=None)
-    shown = _shown(turned, wanted, 0)
+    shown = _shown(turned, selection, 0)
     rate = shown.per_frame / (period or 1.0)
     given = [*shown.series, *([] if shown.joint is None else _speed(motion, shown.joint))]
-    series = [found for each in given if (found := _spectrum(each, rate)) is not None]
+    series = [spectrum for each in given if (spectrum := _spectrum(each, rate)) is not None]
     if not series:
         raise MotionError(f"{shown.name!r} has no known value", clip=motion.name)
     per = "cycles a frame" if period is None else "Hz"
@@ -277,10 +279,10 @@ def _spectrum(series: _Series, rate: float) -> _Series | None:
 
 
 def density(column: Floats, rate: float) -> tuple[Floats, Floats]:
-    """Frequencies and power spectral density of a channel, by Welch's method: the mean of pieces
-    that overlap by half, each without its straight line, under a Hann window.
+    """Frequencies and power spectral density of a channel, by Welch's method.
 
-    SciPy has it, too, but takes seconds to import.
+    The mean of pieces that overlap by half, each without its straight line, under a Hann window.
+    SciPy has it too, but takes seconds to import.
     """
     size = min(len(column), LONGEST)
     starts = range(0, len(column) - size + 1, max(1, size // 2))
@@ -291,7 +293,7 @@ def density(column: Floats, rate: float) -> tuple[Floats, Floats]:
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(size) / size)
     spectra = np.abs(np.fft.rfft(pieces * window, axis=1)) ** 2
     power = spectra.mean(axis=0) / (rate * (window @ window))
-    power[1 : (size + 1) // 2] *= 2  # what is at negative frequencies
+    power[1 : (size + 1) // 2] *= 2  # power at negative frequencies
     return np.arange(size // 2 + 1, dtype=np.float64) * (rate / size), np.asarray(power)
 
 
@@ -307,7 +309,7 @@ def _draw_spectra(figure: Figure, theme: Theme, *, series: Sequence[_Series], pe
 
 
 def _speed(motion: Motion, index: int) -> list[_Series]:
-    """The speed of a joint's point, where there are kinematics and a rate."""
+    """The speed of a joint's point, if kinematics and rate are known."""
     if motion.timeline is None or motion.signals[0].samples_per_frame > 1:
         return []
     try:
@@ -319,13 +321,13 @@ def _speed(motion: Motion, index: int) -> list[_Series]:
 
 
 def _bridged(column: Floats) -> Floats | None:
-    """A channel without gaps; None where nothing of it is known, or it is beyond all measure."""
+    """A channel with unknown values bridged; None if none is known, or one is too large."""
     known = np.isfinite(column) & (np.abs(column) < 1e100)
     if not known.any():
         return None
     at = np.arange(len(column))
-    found: Floats = np.interp(at, at[known], column[known])
-    return found
+    filled: Floats = np.interp(at, at[known], column[known])
+    return filled
 
 
 def _marks(at: Floats, power: Floats) -> tuple[float | None, ...]:

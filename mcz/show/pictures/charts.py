@@ -1,4 +1,4 @@
-"""A chart: what is drawn, the numbers of it as tables, and how both become a file."""
+"""A chart: its drawing, its numbers as tables, and their files."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def save(
 ) -> None:
     """Write a chart as .png, .svg or .html: a page with the tables, in light and dark.
 
-    Raises OptionError, ExistsError where ``path`` is there and not ``force``.
+    Raises OptionError, ExistsError if ``path`` exists and not ``force``.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
@@ -62,12 +62,12 @@ def save(
     if suffix == ".html":
         data = html(chart, (width, height))
     else:
-        data = drawn(chart, colors, (width, height), suffix[1:])
+        data = picture_bytes(chart, colors, (width, height), suffix[1:])
     with replacing(path, force=force) as stream:
         stream.write(data)
 
 
-def drawn(
+def picture_bytes(
     chart: Chart, theme: Theme, size: tuple[int, int], kind: str, *, titled: bool = True
 ) -> bytes:
     """The picture as bytes of a PNG or an SVG, ``kind`` "png" or "svg"."""
@@ -81,7 +81,7 @@ def drawn(
         try:
             chart.draw(figure, theme)
             figure.savefig(out, format=kind, metadata=about, dpi=100 if kind == "svg" else 150)
-        except (ValueError, OverflowError) as error:  # of numbers near the end of float64
+        except (ValueError, OverflowError) as error:  # numbers near the end of float64
             raise MotionError(f"{chart.title}: its numbers cannot be drawn: {error}") from None
     return out.getvalue()
 
@@ -89,18 +89,18 @@ def drawn(
 def html(chart: Chart, size: tuple[int, int]) -> bytes:
     """A page of the chart in both themes and its tables, as UTF-8."""
     pictures = {
-        name: data_uri(drawn(chart, theme, size, "svg", titled=False), "svg+xml")
+        name: data_uri(picture_bytes(chart, theme, size, "svg", titled=False), "svg+xml")
         for name, theme in THEMES.items()
     }
-    found = ChartPage(chart.title, chart.notes)
-    found.add_picture(chart.title, pictures["light"], pictures["dark"])
+    page = ChartPage(chart.title, chart.notes)
+    page.add_picture(chart.title, pictures["light"], pictures["dark"])
     for table in chart.tables:
-        found.add_table(table)
-    return found.html()
+        page.add_table(table)
+    return page.html()
 
 
-def styled(axes: Axes, theme: Theme, *, x: str = "", y: str = "", title: str = "") -> Axes:
-    """Axes in the colors of the theme, with words of which none is mathematics."""
+def style(axes: Axes, theme: Theme, *, x: str = "", y: str = "", title: str = "") -> Axes:
+    """Axes in the colors of the theme, with texts that are not parsed as mathematics."""
     axes.set_facecolor(theme.ground)
     for side, spine in axes.spines.items():
         spine.set_visible(side in ("left", "bottom"))
@@ -117,14 +117,14 @@ def styled(axes: Axes, theme: Theme, *, x: str = "", y: str = "", title: str = "
 
 
 def legend(axes: Axes, theme: Theme, **options: Any) -> None:
-    """The legend in the colors of the theme; its texts are no mathematics."""
-    found = axes.legend(frameon=False, fontsize=8, labelcolor=theme.ink, **options)
-    for text in found.get_texts():
+    """The legend in the colors of the theme; its texts are not parsed as mathematics."""
+    box = axes.legend(frameon=False, fontsize=8, labelcolor=theme.ink, **options)
+    for text in box.get_texts():
         text.set_parse_math(False)
 
 
 def name_ticks(axes: Axes, places: ArrayLike, names: Sequence[str], most: int) -> None:
-    """Names of bars at their places, long ones cut; none is mathematics."""
+    """Names of bars at their places, long ones cut, not parsed as mathematics."""
     shown = [printable(name) for name in names]
     shown = [name if len(name) <= most else f"{name[: most - 1]}…" for name in shown]
     for tick in axes.set_yticks(places, shown):
@@ -133,7 +133,7 @@ def name_ticks(axes: Axes, places: ArrayLike, names: Sequence[str], most: int) -
 
 
 def line(axes: Axes, x: Floats, y: Floats, color: str, label: str = "", **options: Any) -> None:
-    """A line of many points, of which those are drawn that are seen; breaks where y is NaN."""
+    """A line of many points, of which only the visible ones are drawn; breaks where y is NaN."""
     x, y = thinned(x, y)
     axes.plot(x, y, color=color, label=printable(label), **{"linewidth": 1.1} | options)
 
@@ -159,7 +159,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def rows_of(rows: Sequence[Sequence[object]]) -> list[list[str]]:
-    """Cells as text: numbers short, counts whole."""
+    """Cells as text: short numbers, whole counts."""
     return [[_cell(cell) for cell in row] for row in rows]
 
 
@@ -216,7 +216,7 @@ class ChartPage:
     headings: list[str] = field(default_factory=list)
 
     def add_picture(self, name: str, light: str, dark: str) -> None:
-        """A picture on light and on dark ground, each as a data: URI."""
+        """Add a picture on light and on dark ground, each as a data: URI."""
         source = f'<source media="(prefers-color-scheme: dark)" srcset="{_text(dark)}">'
         image = f'<img src="{_text(light)}" alt="{_text(name)}">'
         self.parts.append(f"<figure><picture>{source}{image}</picture></figure>")
@@ -230,7 +230,7 @@ class ChartPage:
         sides = table.right.ljust(len(head), "l")
         rows = "".join(f"<tr>{_cells(row, sides, 'td')}</tr>\n" for row in body)
         heads = _cells(head, sides, "th")
-        # It scrolls by itself, so that it can be reached with the keyboard, too.
+        # It scrolls by itself, so that the keyboard reaches it too.
         self.parts.append(
             f'<div class="scroll" tabindex="0" role="region" aria-label="{_text(table.title)}">'
             f"<table><thead><tr>{heads}</tr></thead>\n<tbody>{rows}</tbody></table></div>"
@@ -264,7 +264,7 @@ class ChartPage:
 
 
 def data_uri(data: bytes, kind: str) -> str:
-    """A picture, "png" or "svg+xml", as the page holds it."""
+    """A picture, "png" or "svg+xml", as a data: URI."""
     return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
@@ -278,5 +278,5 @@ def _cells(row: Sequence[str], sides: str, tag: str) -> str:
 
 
 def _text(text: str) -> str:
-    """Text as it stands in a page, also between quotes; what steers is shown."""
+    """Text for a page, also between quotes; control characters are shown."""
     return escape(printable(text))

@@ -1,4 +1,4 @@
-"""Frames, one by one, to a film: GIF by Pillow, MP4 and WebM by PyAV. None of them is kept."""
+"""Frames, one by one, to a film: GIF by Pillow, MP4 and WebM by PyAV. No frame is kept."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ VIDEO = {
     "mp4": ("libx264", {"crf": "18", "preset": "medium"}),
     "webm": ("libvpx-vp9", {"crf": "28", "b": "0", "deadline": "good", "cpu-used": "4"}),
 }
-COLOURS = 255  # of a GIF; one more says: as before
+COLORS = 255  # of a GIF; one more means unchanged
 TICK = 100  # a second in units of a GIF
 
 
@@ -26,7 +26,7 @@ class Film(Protocol):
 
 @contextmanager
 def film(stream: BinaryIO, kind: str, width: int, height: int, fps: Fraction) -> Iterator[Film]:
-    """A film that takes frames, uint8 (height, width, 3), and is whole when the block ends."""
+    """A film that takes frames, uint8 (height, width, 3), and is complete when the block ends."""
     if kind == "gif":
         gif = _Gif(stream, fps)
         yield gif
@@ -57,9 +57,9 @@ class _Video:
 
 
 class _Gif:
-    """One palette for all; of each frame only the part that changed, unchanged pixels as they were.
+    """One palette for all; of each frame only the part that changed, unchanged pixels transparent.
 
-    Pillow would keep every frame until the end, so that it is given them one at a time.
+    Pillow would keep every frame until the end, so it gets them one at a time.
     """
 
     def __init__(self, stream: BinaryIO, fps: Fraction) -> None:
@@ -74,7 +74,7 @@ class _Gif:
     def add(self, pixels: Pixels) -> None:
         image = self._image.fromarray(pixels)
         if self._palette is None:
-            self._palette = image.quantize(COLOURS, method=self._image.Quantize.MEDIANCUT)
+            self._palette = image.quantize(COLORS, method=self._image.Quantize.MEDIANCUT)
         indices = np.asarray(image.quantize(palette=self._palette, dither=self._image.Dither.NONE))
         at = self._count
         self._count += 1
@@ -84,23 +84,22 @@ class _Gif:
         else:
             changed = indices != self._before
             if not changed.any():
-                return  # the one before is shown longer
+                return  # the frame before is shown longer
             rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
             box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-            part = np.where(changed[box], indices[box], COLOURS).astype(np.uint8)
+            part = np.where(changed[box], indices[box], COLORS).astype(np.uint8)
             corner = int(columns[0]), int(rows[0])
         self._flush(at)
         self._before, self._waiting = indices, (self._as_image(part), corner, at)
 
     def _as_image(self, indices: Any) -> Any:
-        """Indices as a picture of a palette, whose colors are those of the whole film."""
         image = self._image.fromarray(np.ascontiguousarray(indices, np.uint8))
         image.putpalette(bytes(768))
         return image
 
     def _write_header(self, indices: Any) -> None:
         height, width = indices.shape
-        palette = bytes(self._palette.getpalette("RGB")[: 3 * COLOURS]).ljust(3 * 256, b"\0")
+        palette = bytes(self._palette.getpalette("RGB")[: 3 * COLORS]).ljust(3 * 256, b"\0")
         size = width.to_bytes(2, "little") + height.to_bytes(2, "little")
         self._stream.write(b"GIF89a" + size + b"\xf7\0\0" + palette)
         self._stream.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # again and again
@@ -110,7 +109,7 @@ class _Gif:
             return
         image, corner, first = self._waiting
         ticks = round(until * TICK / self._fps) - round(first * TICK / self._fps)
-        options = {"duration": 10 * max(2, ticks), "transparency": COLOURS, "disposal": 1}
+        options = {"duration": 10 * max(2, ticks), "transparency": COLORS, "disposal": 1}
         for block in self._gif.getdata(image, corner, **options):
             self._stream.write(block)
 

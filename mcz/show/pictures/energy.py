@@ -13,9 +13,9 @@ from mcz.kinematics.poses.motion_like import MotionLike
 from mcz.model.motion import Motion
 from mcz.model.types import Reals
 
-CELLS = 48  # of a line: as many segments are decoded at most
+CELLS = 48  # of a line: greatest number of decoded segments
 BLOCK = 2**19  # numbers that are worked on at a time
-CHEAP = 2**19  # numbers that are decoded without being asked
+CHEAP = 2**19  # numbers that are decoded by default
 
 
 def is_cheap(clip: Any) -> bool:
@@ -26,10 +26,10 @@ def is_cheap(clip: Any) -> bool:
 def motion_energy(moving: MotionLike, cells: int = CELLS) -> Floats | None:
     """The mean speed of all points in ``cells`` equal parts of the frames, float64 (n,).
 
-    In length units a second, or a frame where times are unknown; NaN where no position is known,
-    and no step is taken over a gap;
-    of fewer frames there are fewer parts. Of a clip with more segments than parts one segment a
-    part is decoded. None where there are no kinematics, or fewer than two frames.
+    In length units a second, or a frame where times are unknown; NaN where no position is known. No
+    step is taken across a break in time; with fewer frames there are fewer parts. Of a clip with
+    more segments than parts one segment a part is decoded. None without kinematics, or with fewer
+    than two frames.
     """
     if moving.n_frames < 2:
         return None
@@ -39,19 +39,18 @@ def motion_energy(moving: MotionLike, cells: int = CELLS) -> Floats | None:
     sampled = not isinstance(moving, Motion) and len(signal.rows) > cells
     try:
         with np.errstate(all="ignore"):
-            return _sampled(moving, edges) if sampled else _whole(moving, edges)
+            return _sampled(moving, edges) if sampled else _full_speeds(moving, edges)
     except MczError:  # no kinematics, or damaged
         return None
 
 
 def _seconds(moving: MotionLike) -> Floats:
-    """From each frame to the next, NaN across a gap; 1 where times are unknown."""
+    """Seconds from each frame to the next, NaN across a break; 1 where times are unknown."""
     timeline = moving.timeline
     return np.ones(moving.n_frames - 1) if timeline is None else timeline.steps
 
 
-def _whole(moving: MotionLike, edges: Any) -> Floats:
-    """The mean speed in each part, from all of its frames."""
+def _full_speeds(moving: MotionLike, edges: Any) -> Floats:
     width = max(1, moving.skeleton.n_channels + 12 * moving.skeleton.n_joints)
     size = max(1, BLOCK // width)
     means = np.full(moving.n_frames - 1, np.nan)
@@ -66,10 +65,11 @@ def _whole(moving: MotionLike, edges: Any) -> Floats:
 
 
 def _sampled(moving: MotionLike, edges: Any) -> Floats:
-    """The speed in the middle of each part."""
     middles = (edges[:-1] + edges[1:]) // 2
-    found = np.array([_steps(positions(moving, frames=(at, at + 2)))[0] for at in middles.tolist()])
-    speeds: Floats = found / _seconds(moving)[middles]
+    samples = np.array(
+        [_steps(positions(moving, frames=(at, at + 2)))[0] for at in middles.tolist()]
+    )
+    speeds: Floats = samples / _seconds(moving)[middles]
     return speeds
 
 
@@ -77,5 +77,5 @@ def _steps(places: Reals) -> Floats:
     """The mean step of all points from each frame to the next, (n_frames - 1,)."""
     moved = np.sqrt((np.diff(places, axis=0) ** 2).sum(axis=2))
     known = np.isfinite(moved)
-    found: Floats = np.where(known, moved, 0.0).sum(axis=1) / known.sum(axis=1)
-    return found
+    steps: Floats = np.where(known, moved, 0.0).sum(axis=1) / known.sum(axis=1)
+    return steps

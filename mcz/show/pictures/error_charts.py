@@ -1,4 +1,4 @@
-"""The chart of errors: over time, by joint, and on the figure itself where it is farthest off."""
+"""The chart of errors: over time, by joint, and on the figure in its worst frame."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mcz.show.pictures.cameras import Viewport
 from mcz.show.pictures.canvases import Theme, library
 from mcz.show.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
 from mcz.show.pictures.channel_charts import times_of
-from mcz.show.pictures.charts import Chart, Sheet, legend, line, name_ticks, number, rows_of, styled
+from mcz.show.pictures.charts import Chart, Sheet, legend, line, name_ticks, number, rows_of, style
 from mcz.show.pictures.stages import stage_of
 from mcz.show.pictures.tracks import Track, track_of
 
@@ -36,10 +36,11 @@ SIZE = (1100, 760)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Errors:
-    """Distances in ``unit``, "mm" or "units": ``means`` and ``greatest`` of each frame,
-    float64 (n_frames,), NaN where unknown; ``joints`` (name, mean, greatest, frame of that).
+    """Distances in ``unit``, "mm" or "units".
 
-    ``frame`` and ``place`` are where the greatest of all is; frames count from 0 here.
+    ``means`` and ``greatest`` of each frame are float64 (n_frames,), NaN where unknown; ``joints``
+    (name, mean, greatest, its frame). ``frame`` and ``place`` belong to the greatest of all; frames
+    count from 0 here.
     """
 
     unit: str
@@ -56,24 +57,24 @@ class Errors:
 def errors_between(original: Motion, other: Motion) -> Errors:
     """Errors of ``other`` against ``original``: the figures of ``mcz diff``, and of each frame.
 
-    Points in order where both have as many, otherwise joints of the same names. Raises MotionError
-    where the two differ in frames, or have no position in common.
+    Points in order if both have equally many, otherwise joints of the same names. Raises
+    MotionError where the two differ in frames, or have no position in common.
     """
-    found = compare(original, other, virtual_markers=False, shell_cm=None)
+    figures = compare(original, other, virtual_markers=False, shell_cm=None)
     a, b = original.skeleton, other.skeleton
-    factor = 1.0 if found.unit_cm is None else 10.0 * found.unit_cm
-    unit = "units" if found.unit_cm is None else "mm"
-    if found.points is None or len(found.by_joint) != a.n_joints:
+    factor = 1.0 if figures.unit_cm is None else 10.0 * figures.unit_cm
+    unit = "units" if figures.unit_cm is None else "mm"
+    if figures.points is None or len(figures.by_joint) != a.n_joints:
         return _by_names(original, other)
     scale = b.unit_cm / a.unit_cm if a.unit_cm and b.unit_cm else 1.0
-    n_points = found.points
+    n_points = figures.points
     means, greatest = _over_time(
         original,
         other,
         lambda values: positions_of(a, values),
         lambda values: positions_of(b, values)[:, :n_points] * scale,
     )
-    if found.mean_position_error is None or found.where is None:
+    if figures.mean_position_error is None or figures.where is None:
         raise MotionError(f"{original.name!r}, {other.name!r}: no position is known in both")
     joints = [
         (
@@ -82,12 +83,12 @@ def errors_between(original: Motion, other: Motion) -> Errors:
             times(each.max_position_error, factor),
             each.frame,
         )
-        for each in found.by_joint
+        for each in figures.by_joint
     ]
-    assert found.max_position_error is not None
-    overall = (found.mean_position_error * factor, found.max_position_error * factor)
+    assert figures.max_position_error is not None
+    overall = (figures.mean_position_error * factor, figures.max_position_error * factor)
     return Errors(
-        unit, means * factor, greatest * factor, joints, *overall, *found.where, found.notes
+        unit, means * factor, greatest * factor, joints, *overall, *figures.where, figures.notes
     )
 
 
@@ -143,7 +144,7 @@ def _over_time(
     values = [np.asarray(motion.values, np.float64) for motion in (original, other)]
     for start in range(0, n_rows, step):
         rows = slice(start, start + step)
-        with np.errstate(all="ignore"):  # what overflows is no distance
+        with np.errstate(all="ignore"):  # overflow is no distance
             apart = ours(values[0][rows]) - theirs(values[1][rows])
             distances = np.sqrt((apart**2).sum(axis=2))
             known = np.isfinite(distances)
@@ -160,51 +161,53 @@ def _over_time(
 
 def error_chart(original: Motion, other: Motion, up: str | None, first: int = 0) -> Chart:
     """The chart of ``other`` against ``original``, whose frame 0 is ``first`` of the clip."""
-    found = errors_between(original, other)
+    errors = errors_between(original, other)
     summary = (
-        f"mean {number(found.mean)} {found.unit}, greatest {number(found.most)} {found.unit} "
-        f"(frame {found.frame + first}, {found.place})"
+        f"mean {number(errors.mean)} {errors.unit}, greatest {number(errors.most)} {errors.unit} "
+        f"(frame {errors.frame + first}, {errors.place})"
     )
 
-    rows: list[list[object]] = [["joint", f"mean {found.unit}", f"greatest {found.unit}", "frame"]]
+    rows: list[list[object]] = [
+        ["joint", f"mean {errors.unit}", f"greatest {errors.unit}", "frame"]
+    ]
     rows += [
         [name, mean, most, "-" if frame is None else str(frame + first)]
-        for name, mean, most, frame in found.joints
+        for name, mean, most, frame in errors.joints
     ]
     table = Sheet("Errors by joint", rows_of(rows), "lrrr", summary)
     title = f"{other.name} against {original.name}: {summary}"
-    draw = partial(_draw, motion=original, found=found, up=up, first=first)
-    return Chart(title, SIZE, draw, (table,), found.notes)
+    draw = partial(_draw, motion=original, errors=errors, up=up, first=first)
+    return Chart(title, SIZE, draw, (table,), errors.notes)
 
 
 def _draw(
-    figure: Figure, theme: Theme, *, motion: Motion, found: Errors, up: str | None, first: int
+    figure: Figure, theme: Theme, *, motion: Motion, errors: Errors, up: str | None, first: int
 ) -> None:
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.3), height_ratios=(1, 1.15))
-    _draw_figure(figure.add_subplot(grid[:, 0]), theme, motion, found, up, first)
-    _draw_time(figure.add_subplot(grid[0, 1]), theme, motion, found, first)
-    _draw_bars(figure.add_subplot(grid[1, 1]), theme, found)
+    _draw_figure(figure.add_subplot(grid[:, 0]), theme, motion, errors, up, first)
+    _draw_time(figure.add_subplot(grid[0, 1]), theme, motion, errors, first)
+    _draw_bars(figure.add_subplot(grid[1, 1]), theme, errors)
 
 
-def _draw_time(axes: Axes, theme: Theme, motion: Motion, found: Errors, first: int) -> None:
+def _draw_time(axes: Axes, theme: Theme, motion: Motion, errors: Errors, first: int) -> None:
     at, when = times_of(motion, first)
     at = at[:: motion.signals[0].samples_per_frame]
-    styled(axes, theme, x=when, y=found.unit, title="over time")
-    line(axes, at, found.greatest, theme.series[1], "greatest", linewidth=0.8)
-    line(axes, at, found.means, theme.series[0], "mean")
-    axes.set_ylim(0, max(found.most * 1.12, 1e-12))
-    axes.plot(at[found.frame], found.most, "o", color=theme.series[1], markersize=5)
+    style(axes, theme, x=when, y=errors.unit, title="over time")
+    line(axes, at, errors.greatest, theme.series[1], "greatest", linewidth=0.8)
+    line(axes, at, errors.means, theme.series[0], "mean")
+    axes.set_ylim(0, max(errors.most * 1.12, 1e-12))
+    axes.plot(at[errors.frame], errors.most, "o", color=theme.series[1], markersize=5)
     legend(axes, theme, loc="upper right", ncols=2)
 
 
-def _draw_bars(axes: Axes, theme: Theme, found: Errors) -> None:
-    known = [each for each in found.joints if each[1] is not None and each[2] is not None]
+def _draw_bars(axes: Axes, theme: Theme, errors: Errors) -> None:
+    known = [each for each in errors.joints if each[1] is not None and each[2] is not None]
     known.sort(key=lambda each: each[1] or 0.0, reverse=True)
     more = len(known) - MOST_BARS
     shown = known[:MOST_BARS][::-1]
     title = "by joint: mean, and a line to the greatest"
     title += f" ({more} with less left out)" if more > 0 else ""
-    styled(axes, theme, x=found.unit, title=title)
+    style(axes, theme, x=errors.unit, title=title)
     places = np.arange(len(shown))
     means, most = (np.array([each[k] for each in shown], float) for k in (1, 2))
     axes.barh(places, means, color=theme.series[0], height=0.68)
@@ -215,20 +218,20 @@ def _draw_bars(axes: Axes, theme: Theme, found: Errors) -> None:
 
 
 def _draw_figure(
-    axes: Axes, theme: Theme, motion: Motion, found: Errors, up: str | None, first: int
+    axes: Axes, theme: Theme, motion: Motion, errors: Errors, up: str | None, first: int
 ) -> None:
     """The original in the frame of the greatest error, each joint in the color of its mean."""
     axes.set_axis_off()
-    heading = f"frame {found.frame + first}, colored by mean error"
+    heading = f"frame {errors.frame + first}, colored by mean error"
     axes.set_title(heading, loc="left", fontsize=9.5, color=theme.ink)
     try:
-        track = track_of(motion, np.array([found.frame], np.int64), None, up)
-    except MczError:  # nothing to show of it
+        track = track_of(motion, np.array([errors.frame], np.int64), None, up)
+    except MczError:  # nothing to show
         return
-    most = max((each[1] or 0.0 for each in found.joints), default=0.0) or 1.0
+    most = max((each[1] or 0.0 for each in errors.joints), default=0.0) or 1.0
     colors, cm = library("matplotlib.colors"), library("matplotlib.cm")
     scale = cm.ScalarMappable(colors.Normalize(0.0, most), "viridis")
-    means = {name: mean for name, mean, _, _ in found.joints}
+    means = {name: mean for name, mean, _, _ in errors.joints}
     by_joint = np.array(
         [
             theme.sides()[MIDDLE] if means.get(name) is None else scale.to_rgba(means[name])[:3]
@@ -246,11 +249,11 @@ def _draw_figure(
     bar = axes.figure.colorbar(scale, **place)
     bar.outline.set_visible(False)
     bar.ax.tick_params(colors=theme.quiet, labelsize=8)
-    bar.set_label(f"mean error, {found.unit}", color=theme.quiet, fontsize=9)
+    bar.set_label(f"mean error, {errors.unit}", color=theme.quiet, fontsize=9)
 
 
 def _add_polygons(axes: Axes, track: Track, colors: Floats, theme: Theme) -> None:
-    """The one frame of a track, its nodes in these colors (n_nodes, 3)."""
+    """The only frame of a track, with its nodes in these colors (n_nodes, 3)."""
     port = Viewport(0, 0, 420, 560)
     camera = stage_of(track, theme, "front", port, None, 1.0).camera
     ((_, nodes),) = track

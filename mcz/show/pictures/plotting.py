@@ -14,13 +14,13 @@ from mcz.files.reading.source_files import SourceOptions
 from mcz.kinematics.poses.motion_like import Frames, MotionLike, frame_range
 from mcz.model.motion import Motion
 from mcz.show.pictures.byte_charts import bytes_chart, rate_chart
-from mcz.show.pictures.channel_charts import Wanted, channel_chart, spectrum_chart
+from mcz.show.pictures.channel_charts import Selection, channel_chart, spectrum_chart
 from mcz.show.pictures.charts import Chart, save
 from mcz.show.pictures.error_charts import error_chart
 from mcz.show.pictures.rendering import Progress, checked_size
 
 KINDS = ("channels", "spectrum", "error", "bytes", "rate-distortion")
-CODECS = ("posewave", "mrdwt")  # of a chart of rate and distortion, unless others are asked for
+CODECS = ("posewave", "mrdwt")  # of a chart of rate and distortion, by default
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +55,12 @@ def plot(
 ) -> Plotted:
     """Draw numbers of a Motion or a Clip into ``path``: a .png, a .svg, or a .html with its tables.
 
-    ``what``: "channels" of ``joint`` over time (None: of the first that has any), or those of
-    another ``signal``, such as "analog", by their names in ``channels``; their "spectrum",
-    the "error" of ``other`` against ``moving`` (the default where that is given), the "bytes" of a
-    clip by joint and resolution, or "rate-distortion" at a few settings of lossy ``codecs``.
-    ``frames`` (a, b) alone; ``rate``, ``unit`` and ``up`` are for motions that do not say theirs. A
-    page has both themes. Raises OptionError, MotionError, ExistsError.
+    ``what``: "channels" of ``joint`` over time (None: of the first that has any), or of another
+    ``signal``, such as "analog", by their names in ``channels``; their "spectrum", the "error" of
+    ``other`` against ``moving`` (the default if it is given), the "bytes" of a clip by joint and
+    resolution, or "rate-distortion" at a few settings of lossy ``codecs``. Only ``frames`` (a, b)
+    are drawn; ``rate``, ``unit`` and ``up`` are for motions that state none. A page has both
+    themes. Raises OptionError, MotionError, ExistsError.
     """
     what = what or ("channels" if other is None else "error")
     if what not in KINDS:
@@ -69,14 +69,16 @@ def plot(
         text = "takes the two that are compared" if what == "error" else "is of one motion"
         raise OptionError(f"a plot of {what} {text}")
     names = (channels,) if isinstance(channels, str) else channels
-    wanted = Wanted(joint, signal, None if names is None else tuple(names))
-    if wanted != Wanted() and what not in ("channels", "spectrum"):
+    selection = Selection(joint, signal, None if names is None else tuple(names))
+    if selection != Selection() and what not in ("channels", "spectrum"):
         one = next(each for each in (joint, signal, names) if each is not None)
         raise OptionError(f"a plot of {what} is of all joints, not of {one!r}")
     size = checked_size(size)
     cut = frame_range(moving, frames)
     facts = SourceOptions(rate=rate, unit=unit, up=up)
-    chart = _chart(moving, what, other, wanted, cut, codecs, facts, progress or (lambda *_: None))
+    chart = _chart(
+        moving, what, other, selection, cut, codecs, facts, progress or (lambda *_: None)
+    )
     save(chart, path, theme=theme, size=size, force=force)
     tables = tuple(tuple(map(tuple, table.rows)) for table in chart.tables)
     return Plotted(str(path), what, chart.title, tables, chart.notes)
@@ -86,7 +88,7 @@ def _chart(
     moving: MotionLike,
     what: str,
     other: MotionLike | None,
-    wanted: Wanted,
+    selection: Selection,
     cut: tuple[int, int],
     codecs: Sequence[str],
     facts: SourceOptions,
@@ -103,12 +105,11 @@ def _chart(
     if what == "rate-distortion":
         return rate_chart(motion, codecs, progress)
     if what == "spectrum":
-        return spectrum_chart(motion, wanted)
-    return channel_chart(motion, wanted, cut[0])
+        return spectrum_chart(motion, selection)
+    return channel_chart(motion, selection, cut[0])
 
 
 def _motion(moving: MotionLike, cut: tuple[int, int] | None, facts: SourceOptions) -> Motion:
-    """These frames as a motion, with what it does not say itself."""
     if isinstance(moving, Motion):
         motion = moving
         if cut is not None and cut != (0, moving.n_frames):

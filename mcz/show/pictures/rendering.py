@@ -19,12 +19,13 @@ from mcz.kinematics.chain import Floats
 from mcz.kinematics.poses.motion_like import Frames, MotionLike, frame_range
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.clock import Timeline
-from mcz.show.pictures.bodies import LEFT, RIGHT, Flags, Ints
+from mcz.model.types import Ints
+from mcz.show.pictures.bodies import LEFT, RIGHT, Flags
 from mcz.show.pictures.cameras import Viewport
 from mcz.show.pictures.canvases import Canvas, Drawing, Theme, Word, library, theme_of
 from mcz.show.pictures.capsules import Shapes
 from mcz.show.pictures.encoders import film
-from mcz.show.pictures.stages import AROUND, Stage, drawing_of, shortened, stage_of, words_around
+from mcz.show.pictures.stages import MARGIN, Stage, drawing_of, shortened, stage_of, words_around
 from mcz.show.pictures.tracks import track_of
 
 FILMS = {".gif": Fraction(25), ".mp4": Fraction(30), ".webm": Fraction(30)}
@@ -34,7 +35,7 @@ NEEDED = {
     ".mp4": ("av", "matplotlib"),  # the extra that has av has both
     ".webm": ("av", "matplotlib"),
 }
-USUAL_RATE = Fraction(120)  # frames a second where nobody says: that of CMU's AMC files
+USUAL_RATE = Fraction(120)  # assumed frames a second: the rate of CMU's AMC files
 SIZE, SIZE_OF_GIF = (640, 640), (480, 480)
 SMALLEST, GREATEST = 64, 4096
 FASTEST = 120  # frames a second of a film
@@ -48,7 +49,7 @@ Progress = Callable[[int, int, str], None]
 class Rendered:
     """A written rendering: ``n_pictures`` of ``width`` x ``height``, in ``n_bytes``.
 
-    ``fps`` is None of a still. ``notes`` say what was assumed.
+    ``fps`` is None of a still. ``notes`` list assumptions.
     """
 
     path: str
@@ -91,14 +92,14 @@ def render(
     """Draw a Motion or a Clip into ``path``: a film (.gif, .mp4, .webm) or a still (.png, .svg).
 
     A still is the middle one of ``frames`` (a, b), or with ``sheet`` that many poses, evenly over
-    them. ``view`` "front", "side", "top" or "three-quarter" is from where the figure faces first;
-    ``theme`` "light" or "dark"; ``size`` (width, height) in pixels. A film has ``fps`` pictures a
-    second and plays ``speed`` times as fast as the motion was. ``follow``: the camera goes along;
-    None lets it where the figure would be small otherwise. ``rate`` in frames a second, ``unit``
-    and ``up`` are for motions that do not say theirs; what is assumed else, the result says.
+    them. ``view`` "front", "side", "top" or "three-quarter" is relative to the first facing of the
+    figure; ``theme`` "light" or "dark"; ``size`` (width, height) in pixels. A film has ``fps``
+    pictures a second and plays ``speed`` times as fast as the motion was. ``follow``: the camera
+    follows; None: only where the figure would be small otherwise. ``rate`` in frames a second,
+    ``unit`` and ``up`` are for motions that state none; the result lists assumptions.
 
-    Raises OptionError, also where a library is not installed, MotionError where there is nothing to
-    draw, ExistsError where ``path`` exists and not ``force``.
+    Raises OptionError, also if a library is not installed, MotionError for a motion without points,
+    ExistsError where ``path`` exists and not ``force``.
     """
     suffix = _kind(path, sheet)
     look = Look(view, theme_of(theme), checked_size(size), follow)
@@ -111,24 +112,24 @@ def render(
     first, stop = frame_range(moving, frames)
     if first == stop:
         raise MotionError(f"{moving.name!r} has no frame there: nothing to draw")
-    told = progress or (lambda *_: None)
-    job = _Job(moving, path, look, timeline, (unit, up), force, told, notes)
+    report = progress or (lambda *_: None)
+    job = _Job(moving, path, look, timeline, (unit, up), force, report, notes)
     if suffix in FILMS:
-        wanted = _fps(fps, FILMS[suffix])
+        film_rate = _fps(fps, FILMS[suffix])
         if timeline is None:
             text = f"its frame rate is unknown: {USUAL_RATE} a second assumed"
             notes.append(Remark(text, Hint.RATE))
-            shown = drawn_frames(first, stop, USUAL_RATE, wanted, speed)
+            shown = drawn_frames(first, stop, USUAL_RATE, film_rate, speed)
         else:
-            shown = first + _shown_at(timeline.cut(slice(first, stop)), wanted, speed)
-        return job.film(shown, wanted, suffix)
+            shown = first + _shown_at(timeline.cut(slice(first, stop)), film_rate, speed)
+        return job.film(shown, film_rate, suffix)
     if sheet is not None:
         return job.sheet(np.linspace(first, stop - 1, sheet).round().astype(np.int64))
     return job.still(np.array([(first + stop - 1) // 2], np.int64))
 
 
 def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
-    """The suffix of what is drawn, whose libraries are there; raises OptionError."""
+    """The suffix of the picture, whose libraries are installed; raises OptionError."""
     suffix = Path(path).suffix.lower()
     if suffix not in (*FILMS, *STILLS):
         known = ", ".join((*FILMS, *STILLS))
@@ -143,7 +144,7 @@ def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
 
 
 def checked_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
-    """``size``; OptionError where a picture cannot have it."""
+    """Return ``size``; OptionError if a picture cannot have it."""
     if size is not None and not all(SMALLEST <= each <= GREATEST for each in size):
         raise OptionError(
             f"a picture of {size[0]} x {size[1]} pixels: each is {SMALLEST} to {GREATEST}"
@@ -154,25 +155,25 @@ def checked_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
 def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: float) -> Ints:
     """The frame that each picture of a film shows, the nearest in time; at least one.
 
-    Raises OptionError for a speed that is no positive number.
+    Raises OptionError for a speed that is not a positive number.
     """
     if not 0 < speed < np.inf:
         raise OptionError(f"speed {speed:g} is not a number above 0")
     step = float(rate) * speed / float(fps)
-    wanted = (stop - 1 - first) / step + 1e-9 if step else np.inf
-    if wanted >= MOST_PICTURES:
+    n_steps = (stop - 1 - first) / step + 1e-9 if step else np.inf
+    if n_steps >= MOST_PICTURES:
         raise OptionError(
-            f"a film of {wanted:.3g} pictures: below {MOST_PICTURES:,}", hint=Hint.FILM
+            f"a film of {n_steps:.3g} pictures: below {MOST_PICTURES:,}", hint=Hint.FILM
         )
-    count = max(1, int(wanted) + 1)
-    found: Ints = (first + np.floor(np.arange(count) * step + 0.5)).astype(np.int64)
-    return np.minimum(found, stop - 1)
+    count = max(1, int(n_steps) + 1)
+    frames: Ints = (first + np.floor(np.arange(count) * step + 0.5)).astype(np.int64)
+    return np.minimum(frames, stop - 1)
 
 
 def _shown_at(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
-    """``drawn_frames`` by times: where frames are missing, the one before them stays."""
+    """``drawn_frames`` by times: across a break in time the frame before stays."""
     period = timeline.period or 1.0 / USUAL_RATE
-    places = np.rint((timeline.even - timeline.even[0]) / period)
+    places = np.rint((timeline.regular_times - timeline.regular_times[0]) / period)
     rate, known = Fraction(1 / period).limit_denominator(2**20), timeline.rate
     rate = known if known and abs(float(known) * period - 1) < 1e-6 else rate or Fraction(1, 2**20)
     shown = drawn_frames(0, int(places[-1]) + 1, rate, fps, speed)
@@ -199,8 +200,6 @@ def _fps(fps: float | Fraction | None, usual: Fraction) -> Fraction:
 
 @dataclass(frozen=True, slots=True)
 class _Job:
-    """One picture to make."""
-
     moving: MotionLike
     path: str | os.PathLike[str]
     look: Look
@@ -213,7 +212,7 @@ class _Job:
     def film(self, frames: Ints, fps: Fraction, suffix: str) -> Rendered:
         width, height = self.look.size or (SIZE if suffix != ".gif" else SIZE_OF_GIF)
         if suffix != ".gif":
-            width, height = width // 2 * 2, height // 2 * 2  # as these codecs want it
+            width, height = width // 2 * 2, height // 2 * 2  # required by these codecs
         stage = self._stage(frames, width, height, float(fps))
         canvas = Canvas(width, height, self.look.theme)
         with replacing(self.path, force=self.force) as stream:
@@ -233,17 +232,17 @@ class _Job:
         ((frame, nodes),) = stage.track
         words = words_around(stage, width, height, self.moving.name, self._when(frame))
         canvas.draw(drawing_of(stage, 0, nodes, words))
-        return self._rendered(self._written(canvas), 1, width, height, None)
+        return self._rendered(self._write_still(canvas), 1, width, height, None)
 
     def sheet(self, frames: Ints) -> Rendered:
         layout = sheet_size(len(frames), self.look.size)
         port = Viewport(0, 0, *layout.cell)
-        # Each pose is looked at where it is, from the same side and as far.
+        # The camera has the same angle and distance for each pose.
         stage = self._stage(frames, *layout.cell, rate=0.0, follow=True, port=port, around=0.6)
         canvas = Canvas(layout.width, layout.height, self.look.theme)
         title = f"{self.moving.name}"
         canvas.draw(sheet_drawing(stage, layout, title, self._when))
-        size = self._written(canvas)
+        size = self._write_still(canvas)
         return self._rendered(size, len(frames), layout.width, layout.height, None)
 
     def _stage(
@@ -254,7 +253,7 @@ class _Job:
         rate: float,
         follow: bool | None = None,
         port: Viewport | None = None,
-        around: float = AROUND,
+        around: float = MARGIN,
     ) -> Stage:
         track = track_of(self.moving, frames, *self.facts)
         if track.up_assumed:
@@ -267,10 +266,9 @@ class _Job:
     def _when(self, frame: int) -> str:
         if self.timeline is None:
             return f"frame {frame}"
-        return f"frame {frame}  {self.timeline.even[frame]:.2f} s"
+        return f"frame {frame}  {self.timeline.regular_times[frame]:.2f} s"
 
-    def _written(self, canvas: Canvas) -> int:
-        """Write a still; its bytes."""
+    def _write_still(self, canvas: Canvas) -> int:
         with replacing(self.path, force=self.force) as stream:
             write_still(canvas, stream, Path(self.path).suffix.lower(), self.moving.name)
             return stream.tell()
@@ -290,9 +288,9 @@ def write_still(canvas: Canvas, stream: BinaryIO, suffix: str, title: str) -> No
 
 
 CELL = (220, 300)  # pixels of a pose
-WIDE = 1.9  # of a whole sheet, how much wider than high it gets about
+WIDE = 1.9  # of a whole sheet, its approximate ratio of width to height
 HEAD, FOOT, LABEL = 44, 10, 26  # pixels above all, below all, below each pose
-LEAST = 60  # pixels of a cell
+LEAST_CELL = 60  # pixels of a cell
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,13 +316,13 @@ def sheet_size(count: int, size: tuple[int, int] | None) -> Layout:
         size = columns * CELL[0], rows * (CELL[1] + LABEL) + HEAD + FOOT
     else:
         cell = size[0] // columns, (size[1] - HEAD - FOOT) // rows - LABEL
-    if min(cell) < LEAST:
+    if min(cell) < LEAST_CELL:
         raise OptionError(f"a sheet of {size[0]} x {size[1]} pixels is too small for {count} poses")
     return Layout(*size, columns, rows, cell)
 
 
 def sheet_drawing(stage: Stage, layout: Layout, title: str, when: Callable[[int], str]) -> Drawing:
-    """The sheet as a drawing; ``when`` says of a frame what is written below it."""
+    """The sheet as a drawing; ``when`` returns the text below a frame."""
     shadows, figures, lines, colors, words = Shapes(), Shapes(), [], [], []
     letter, theme = 12.0, stage.theme
     small = min(letter, layout.cell[0] / 12)
@@ -334,7 +332,7 @@ def sheet_drawing(stage: Stage, layout: Layout, title: str, when: Callable[[int]
         bottom = layout.height - HEAD - row * (layout.cell[1] + LABEL) - layout.cell[1]
         camera = replace(stage.camera_of(number), view=Viewport(left, bottom, *layout.cell))
         pixels, shades = stage.floor(camera)
-        inside = _inside(pixels, left, bottom, layout.cell)
+        inside = _within_cell(pixels, left, bottom, layout.cell)
         lines.append(pixels[inside])
         colors.append(shades[inside])
         stage.add(shadows, figures, camera, nodes)
@@ -365,6 +363,6 @@ def _heading(stage: Stage, layout: Layout, title: str, top: float, letter: float
     return words
 
 
-def _inside(pixels: Floats, left: float, bottom: float, cell: tuple[int, int]) -> Flags:
+def _within_cell(pixels: Floats, left: float, bottom: float, cell: tuple[int, int]) -> Flags:
     low, high = np.array([left, bottom]), np.array([left + cell[0], bottom + cell[1]])
     return np.asarray(((pixels >= low) & (pixels <= high)).all(axis=(1, 2)))

@@ -1,4 +1,4 @@
-"""A frame of a track as a drawing: camera, floor, shadow, figure, and what is written around it."""
+"""A frame of a track as a drawing: camera, floor, shadow, figure, and texts."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from mcz.show.pictures.tracks import Track
 
 ROAM = 1.1  # sizes of the figure that it may move about before the camera follows
 STILL = 0.35  # seconds over which a camera that follows is steadied
-AROUND = 1.25  # of the figure's size, how far the floor reaches beyond it
-ROOM = 0.10  # of its size, left free around the figure
+MARGIN = 1.25  # of the figure's size, from the figure to the edge of the floor
+ROOM = 0.10  # of its size, free space around the figure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class Stage:
         return self.camera if self.targets is None else self.camera.at(self.targets[number])
 
     def add(self, shadows: Shapes, figures: Shapes, camera: Camera, nodes: Floats) -> None:
-        """Draw a frame, whose nodes are (n_nodes, 3), as ``camera`` sees it."""
+        """Draw a frame, whose nodes are (n_nodes, 3), from ``camera``."""
         body, size = self.track.body, self.track.size
         pieces = pieces_of(self.track, nodes, self.theme.sides()[body.sides])
         add_shadow(shadows, camera, pieces, self.track.floor, self.theme)
@@ -58,12 +58,12 @@ def stage_of(
     port: Viewport,
     follow: bool | None,
     rate: float,
-    around: float = AROUND,
+    around: float = MARGIN,
 ) -> Stage:
-    """Choose a view that shows all of a track; ``rate`` its frames a second,
-    ``around`` how far the floor reaches, of the figure's size.
+    """Choose a view that shows all of a track; ``rate`` its frames a second.
 
-    With ``follow`` the camera goes along, with None only where the figure would be small otherwise.
+    ``around`` is the margin of the floor, of the figure's size. With ``follow`` the camera follows,
+    with None only where the figure would be small otherwise.
     """
     axes = axes_of(view, track.forward)
     known = known_places(track.centers)
@@ -86,18 +86,18 @@ def stage_of(
 
 def steadied(centers: Floats, rate: float) -> Floats:
     """Targets of a following camera: ``centers`` (n, 3), gaps bridged and smoothed."""
-    found = centers.copy()
-    frames = np.arange(len(found))
-    known = known_places(found)
+    targets = centers.copy()
+    frames = np.arange(len(targets))
+    known = known_places(targets)
     for axis in range(3):
-        found[:, axis] = np.interp(frames, frames[known], found[known, axis])
-    half = min(int(STILL * rate), len(found) - 1)
+        targets[:, axis] = np.interp(frames, frames[known], targets[known, axis])
+    half = min(int(STILL * rate), len(targets) - 1)
     if half > 0:
         window = np.hanning(2 * half + 3)[1:-1]
-        padded = np.pad(found, ((half, half), (0, 0)), mode="edge")
+        padded = np.pad(targets, ((half, half), (0, 0)), mode="edge")
         for axis in range(3):
-            found[:, axis] = np.convolve(padded[:, axis], window / window.sum(), mode="valid")
-    return found
+            targets[:, axis] = np.convolve(padded[:, axis], window / window.sum(), mode="valid")
+    return targets
 
 
 def _box(track: Track, axes: Floats, targets: Floats | None) -> tuple[Floats, Floats]:
@@ -159,21 +159,21 @@ def drawing_of(stage: Stage, number: int, nodes: Floats, words: list[Word]) -> D
 
 
 SQUARES = 4.0  # of the grid, on the size of the figure
-MOST = 40  # squares from side to side
-FADE = 0.55  # of the way to the edge, from where lines fade
+MOST_SQUARES = 40  # from side to side
+FADE = 0.55  # of the way to the edge, where lines begin to fade
 
 
 def square_of(size: float, reach: float = 0.0) -> float:
     """A round length, 1, 2 or 5 times a power of ten, for a figure of that size.
 
-    A floor that reaches far, ``reach`` from its middle, has greater squares.
+    A large floor, with ``reach`` from its middle, has greater squares.
 
     >>> square_of(170.0), square_of(1.7), square_of(36.0)
     (50.0, 0.5, 10.0)
     """
-    wanted = max(size / SQUARES, 2 * reach / MOST)
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return power * min((1, 2, 5, 10), key=lambda k: abs(math.log(wanted / (k * power))))
+    length = max(size / SQUARES, 2 * reach / MOST_SQUARES)
+    power = 10.0 ** math.floor(math.log10(length))
+    return power * min((1, 2, 5, 10), key=lambda k: abs(math.log(length / (k * power))))
 
 
 def length_text(length: float, unit: str) -> str:
@@ -192,7 +192,7 @@ def floor_lines(
     """Pieces of lines (n, 2, 2) in pixels and their colors (n, 3).
 
     The grid reaches ``reach`` (2,) from ``middle`` (2,) at the height ``floor``; its lines lie at
-    multiples of ``square``, wherever that is.
+    multiples of ``square``.
     """
     low = np.floor((middle - reach) / square).astype(np.int64)
     high = np.ceil((middle + reach) / square).astype(np.int64)
@@ -201,14 +201,14 @@ def floor_lines(
     lines = np.concatenate(pieces)
     away = ((lines.mean(axis=1)[:, :2] - middle) / (reach + square)) ** 2
     fade = np.clip((np.sqrt(away.sum(axis=1)) - FADE) / (1 - FADE), 0, 1)[:, None]
-    pixels, _ = camera.seen(lines)
+    pixels, _ = camera.project(lines)
     kept = np.isfinite(pixels).all(axis=(1, 2)) & (fade[:, 0] < 1)
     colors = np.array(rgb(theme.grid)) * (1 - fade) + np.array(rgb(theme.ground)) * fade
     return pixels[kept], colors[kept]
 
 
 def _pieces(fixed: Floats, steps: Floats, floor: float) -> Floats:
-    """Lines at ``fixed`` of the first axis, cut where they cross those at ``steps``, (n, 2, 3)."""
+    """Lines at ``fixed`` of the first axis, cut at their crossings with ``steps``, (n, 2, 3)."""
     x, y = np.meshgrid(fixed, steps[:-1], indexing="ij")
     ends = [
         np.stack([x, y + k * (steps[1:] - steps[:-1]), np.full_like(x, floor)], -1) for k in (0, 1)

@@ -1,6 +1,6 @@
 """Frames of a motion as nodes in one frame of reference: forward x, left y, up z, in cm if known.
 
-Nothing is kept but what bounds the whole: positions are read again, block after block.
+Only bounds of the whole are kept: positions are read again, block after block.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mcz.kinematics.joint_groups import find_feet
 from mcz.kinematics.points import point_set
 from mcz.kinematics.poses.motion_like import MotionLike, values_of
 from mcz.model.skeleton import signs_of
+from mcz.model.types import Ints
 from mcz.model.units import unit_cm_of
 from mcz.show.pictures.bodies import (
     LEFT,
     RIGHT,
     Body,
-    Ints,
     body_of,
     fitted,
     known_places,
@@ -31,22 +31,22 @@ from mcz.show.pictures.bodies import (
     size_of,
 )
 
-BLOCK = 2**19  # numbers that are worked on at a time: what bounds the memory
-SAMPLES = 64  # frames that sizes and facing are taken from
-MOST_LEAD = 2**14  # frames between two drawn ones that are read for nothing at most
+BLOCK = 2**19  # numbers a block, which bounds the memory
+SAMPLES = 64  # frames that determine sizes and facing
+MOST_LEAD = 2**14  # greatest number of frames read in vain between two drawn ones
 TURNS = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}  # the axes of the file that are x, y, z
-FARTHEST = 1e12  # cm or units from the origin: what is farther is unknown
-AWAY = 300  # sizes of the figure from where it usually is: what is farther is a fault
+FARTHEST = 1e12  # cm or units from the origin: farther points are unknown
+MOST_SIZES = 300  # sizes of the figure from its usual place: farther points are faults
 STEADY = 0.5  # of 1: how much of the time it faces one way, or the first frame counts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Some frames of a motion, in order, and what all of them have in common.
+    """Some frames of a motion, in order, and their common facts.
 
-    ``size`` is that of the figure, ``radii`` (n_bones, 2) how thick its bones are, ``floor`` the
-    height of what it stands on, ``forward`` (3,) where it faces; all in ``unit``, "cm" or "units".
-    ``centers`` (n_frames, 3) is where it is, NaN where unknown; ``up`` the axis of the file.
+    ``size`` is the figure's, ``radii`` (n_bones, 2) the thickness of its bones, ``floor`` the
+    height of the floor, ``forward`` (3,) its facing; all in ``unit``, "cm" or "units". ``centers``
+    (n_frames, 3) is its position, NaN where unknown; ``up`` the axis of the file.
     """
 
     moving: MotionLike
@@ -73,7 +73,7 @@ class Track:
 
 
 def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None) -> Track:
-    """The track of these frames, ascending; ``unit`` and ``up`` where the skeleton says none.
+    """The track of these frames, ascending; ``unit`` and ``up`` where the skeleton states none.
 
     Raises MotionError where the motion has no kinematics, no joint, no frame, or no known position.
     """
@@ -106,15 +106,15 @@ def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None)
         forward=facing(body, seen),
         centers=np.empty((0, 3)),
     )
-    return _measured(track)
+    return _measure_track(track)
 
 
 def unknown(moving: MotionLike) -> MotionError:
     return MotionError("no position is known in these frames: nothing to draw", clip=moving.name)
 
 
-def _measured(track: Track) -> Track:
-    """``track`` with its floor and its centers, for which every frame is looked at once."""
+def _measure_track(track: Track) -> Track:
+    """``track`` with its floor and its centers, from one pass over all frames."""
     shown = track.body.shown
     lows, centers = [], []
     for _, places in track.blocks():
@@ -124,16 +124,16 @@ def _measured(track: Track) -> Track:
             centers.append(
                 (known.min(axis=0) + known.max(axis=0)) / 2 if len(known) else np.full(3, np.nan)
             )
-    found = np.array(lows)
-    found = found[np.isfinite(found)]
-    low = float(np.quantile(found, 0.02)) if len(found) else 0.0
+    heights = np.array(lows)
+    heights = heights[np.isfinite(heights)]
+    low = float(np.quantile(heights, 0.02)) if len(heights) else 0.0
     low = 0.0 if 0 <= low < 0.06 * track.size else low - 0.004 * track.size
     middles = np.array(centers).reshape(-1, 3)
     if not known_places(middles).any():
         raise unknown(track.moving)
     usual = np.median(middles[known_places(middles)], axis=0)
     with np.errstate(invalid="ignore"):
-        middles[~(np.abs(middles - usual).max(axis=1) <= AWAY * track.size)] = np.nan
+        middles[~(np.abs(middles - usual).max(axis=1) <= MOST_SIZES * track.size)] = np.nan
     return replace(track, floor=low, centers=middles)
 
 
@@ -160,12 +160,12 @@ def _blocks(
 
 
 def _turned(places: Floats, up: str) -> Floats:
-    found: Floats = (places * signs_of(up))[:, :, TURNS[up[-1]]]
-    return found
+    turned_places: Floats = (places * signs_of(up))[:, :, TURNS[up[-1]]]
+    return turned_places
 
 
 def _samples_per_frame(moving: MotionLike) -> int:
-    signal: Any = moving.signals[0]  # of a Motion, or what a Clip says of one
+    signal: Any = moving.signals[0]  # of a Motion, or the facts of a Clip
     return int(getattr(signal, "samples_per_frame", 0) or signal.layout.samples_per_frame)
 
 
@@ -187,7 +187,7 @@ def guessed_up(body: Body, places: Floats) -> str:
 def facing(body: Body, places: Floats) -> Floats:
     """Facing of the figure, a horizontal unit vector: across its left and its right.
 
-    That of most frames, or where it turns much that of the first; x where no name tells sides.
+    The facing of most frames, or if it turns much of the first; x if no name shows sides.
     """
     across = np.zeros((len(places), 3))
     for side, sign in ((LEFT, 1.0), (RIGHT, -1.0)):

@@ -1,4 +1,4 @@
 """The page that shows motions: a server for it, files of it to mail, small players in notebooks.
 
-The page itself is the project ``tools/viewer``; a wheel carries it as ``viewer.html`` beside this.
+The page itself is the project ``tools/viewer``; a wheel contains it here as ``viewer.html``.
 """

@@ -1,4 +1,4 @@
-"""One page that holds player, decoder and files: it opens from a disk, and can be mailed."""
+"""One page with player, decoder and files: it opens from a disk, and can be mailed."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ from mcz.model.types import JsonObject, Params, Target
 from mcz.show.viewing.file_registry import FACTS, Shelf, Shelved
 from mcz.show.viewing.page import Page
 
-MOST_BYTES = 50 * 2**20  # of a page, unless more is asked for: what mail and browsers take
-MOST_COMPARED = 32  # pairs of clips whose figures are put into the page; it finds the rest itself
+MOST_BYTES = 50 * 2**20  # of a page, by default: accepted by mail and browsers
+# pairs of clips whose figures are put into the page; it computes the rest itself
+MOST_COMPARED = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wanted:
+class PageOptions:
     """Contents of a page: these clips, re-encoded if a codec is named."""
 
     clips: Sequence[str] = ()
@@ -51,7 +52,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Embedded:
-    """A file in a page: its name, its bytes as they are, the number of its clips."""
+    """A file in a page: its name, its original size, the number of its clips."""
 
     name: str
     size: int
@@ -62,7 +63,7 @@ class Embedded:
 
 @dataclass(frozen=True, slots=True)
 class PageWritten:
-    """A page that was written: its bytes, those of the player alone, and the files in it."""
+    """A written page: its size, the size of the player alone, and its files."""
 
     size: int
     player_size: int
@@ -75,29 +76,29 @@ def write_page(
     page: Page,
     shelf: Shelf,
     target: Target,
-    wanted: Wanted,
+    options: PageOptions,
     *,
     most: int = MOST_BYTES,
     force: bool = False,
 ) -> PageWritten:
     """Write ``page`` with the files of ``shelf`` in it.
 
-    The page is whole under the target's name, or not there. Raises LimitError where it would have
+    The page is complete under the target's name, or not there. Raises LimitError if it would have
     more than ``most`` bytes, and MczError for files that cannot be read, cut or coded so.
     """
     given = [file for _, file in shelf.given()]
     inputs = [file.source for file in given]
     with replacing(target, force=force, inputs=inputs) as stream, ExitStack() as stack:
-        held, left = {}, most
+        contents, left = {}, most
         for number, file in enumerate(given):
-            data = _bytes_of(file, shelf, wanted, left)
+            data = _bytes_of(file, shelf, options, left)
             left -= len(data) * 4 // 3
-            held[number] = data, stack.enter_context(_file(data, wanted.max_decoded))
-        files = [file for _, file in held.values()]
+            contents[number] = data, stack.enter_context(_file(data, options.max_decoded))
+        files = [file for _, file in contents.values()]
         document: JsonObject = {
             "files": [
                 {"name": given[number].name, "base64": base64.b64encode(data).decode()}
-                for number, (data, _) in held.items()
+                for number, (data, _) in contents.items()
             ],
             "annex": deflated(set().union(*map(tables_for, files))),
         }
@@ -108,12 +109,14 @@ def write_page(
         if len(whole) > most:
             raise _too_large(given[-1].name, most)
         stream.write(whole)
-        found = (Embedded(given[n].name, file.size, len(file)) for n, (_, file) in held.items())
-        return PageWritten(len(whole), len(page.text.encode()), tuple(found))
+        entries = (
+            Embedded(given[n].name, file.size, len(file)) for n, (_, file) in contents.items()
+        )
+        return PageWritten(len(whole), len(page.text.encode()), tuple(entries))
 
 
 def element(document: Params) -> str:
-    """The element that holds a document; no text in it is markup, and nothing in it runs."""
+    """The element with a document; no text in it is markup, and no script in it runs."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="embedded">{text}</script>'
 
@@ -130,17 +133,17 @@ def _file(data: bytes, max_decoded: int | None) -> File:
         return mcz_open(data, salvage=True, max_decoded=max_decoded)
 
 
-def _bytes_of(file: Shelved, shelf: Shelf, wanted: Wanted, most: int) -> bytes:
-    """The bytes of an ``.mcz`` that is put into the page; raises LimitError beyond ``most``."""
+def _bytes_of(file: Shelved, shelf: Shelf, options: PageOptions, most: int) -> bytes:
+    """The bytes of an ``.mcz`` for the page; raises LimitError beyond ``most``."""
     target = file.target()
-    if wanted.is_coded:
-        return _coded(target, shelf, wanted)
+    if options.is_coded:
+        return _coded(target, shelf, options)
     facts = ", ".join(fact for fact in FACTS if shelf.said.get(fact) is not None)
     if facts and file.kind == "mcz":
         text = f"{file.name}: copied as it is, without the {facts} that you give"
         shelf.say(with_hint(text, Hint.NAME_CODEC, shelf.hints))
-    if wanted.is_cut:
-        return _cut(target, shelf, wanted)
+    if options.is_cut:
+        return _cut(target, shelf, options)
     contents = file.open()
     try:
         if contents.size * 4 // 3 > most:
@@ -150,7 +153,7 @@ def _bytes_of(file: Shelved, shelf: Shelf, wanted: Wanted, most: int) -> bytes:
         contents.close()
 
 
-def _cut(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
+def _cut(target: str, shelf: Shelf, options: PageOptions) -> bytes:
     """Some clips of a file, copied as they are stored."""
     from mcz.files.editing.extraction import extract
 
@@ -158,27 +161,29 @@ def _cut(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
     extract(
         target,
         out,
-        clip=wanted.clips or None,
-        where=wanted.where,
+        clip=options.clips or None,
+        where=options.where,
         salvage=shelf.salvage,
-        max_decoded=wanted.max_decoded,
+        max_decoded=options.max_decoded,
         copies=False,
     )
     return out.getvalue()
 
 
-def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
-    """The clips that are wanted, coded anew."""
+def _coded(target: str, shelf: Shelf, options: PageOptions) -> bytes:
     from mcz.container.writer import Writer
     from mcz.files.writing.planning import prepare, under_its_path
     from mcz.files.writing.tuning import write_motion
 
-    codec, params = codec_by_name(choose_name(wanted.codec, wanted.effort)), wanted.params or {}
+    codec, params = (
+        codec_by_name(choose_name(options.codec, options.effort)),
+        options.params or {},
+    )
     out = io.BytesIO()
-    with mcz_open(target, salvage=shelf.salvage, max_decoded=wanted.max_decoded) as file:
+    with mcz_open(target, salvage=shelf.salvage, max_decoded=options.max_decoded) as file:
         writer = Writer(out, profile=file.container.profile)
-        for clip in file.chosen(wanted.clips or None, wanted.where):
-            motion = shelf.told(clip.motion())
+        for clip in file.chosen(options.clips or None, options.where):
+            motion = shelf.with_facts(clip.motion())
             prepared = prepare(motion, codec, params, (under_its_path(motion.skeleton),))
             write_motion(writer, prepared, codec, params)
         writer.finish()
@@ -192,15 +197,15 @@ def _differences(files: Sequence[File], names: Sequence[str], shelf: Shelf) -> I
         pairs = [(one, one) for one in first.clips if one in other.clips.rows]
         if len(first) == len(other) == 1:
             pairs = [(next(iter(first.clips)), next(iter(other.clips)))]
-        found, notes = [], []
+        entries, notes = [], []
         for a, b in pairs[:MOST_COMPARED]:
             try:
-                original = shelf.told(first.clips[a].motion())
-                coded = shelf.told(other.clips[b].motion())
-                found.append(diff_document(original, coded, by_joint=True))
+                original = shelf.with_facts(first.clips[a].motion())
+                coded = shelf.with_facts(other.clips[b].motion())
+                entries.append(diff_document(original, coded, by_joint=True))
             except MczError as error:
                 notes.append(f"{a}: {error.describe(shelf.hints)}")
-        yield {"a": names[0], "b": name, "clips": found, "notes": notes}
+        yield {"a": names[0], "b": name, "clips": entries, "notes": notes}
 
 
 ALWAYS = ("words.bin",)  # the names of joints are packed with them
@@ -227,24 +232,24 @@ def tables_for(file: File) -> set[str]:
     """The names of the annexes that decoding any clip of ``file`` may need."""
     from mcz.codecs import CODECS
 
-    found = set(ALWAYS)
+    names = set(ALWAYS)
     for row in file.container.directory.clips.values():
         for signal in row.signals:
-            found.update(TABLES.get(CODECS.find(signal.codec, signal.preset) or "", ()))
+            names.update(TABLES.get(CODECS.find(signal.codec, signal.preset) or "", ()))
     for clip in file:
         try:
             models = {id_ for signal in clip.signals for id_ in models_used(signal)}
         except MczError:  # a damaged clip, which the decoder cannot read either
             continue
-        found.update(f"bases_{name}.bin" for id_ in models if (name := known_model_name(id_)))
-    return found
+        names.update(f"bases_{name}.bin" for id_ in models if (name := known_model_name(id_)))
+    return names
 
 
 def deflated(names: Iterable[str]) -> dict[str, str]:
     """These annexes by name, each raw deflate in base64."""
-    found = {}
+    texts = {}
     for name in sorted(names):
         packer = zlib.compressobj(9, zlib.DEFLATED, -15)
         data = packer.compress(annex_bytes(name)) + packer.flush()
-        found[name] = base64.b64encode(data).decode()
-    return found
+        texts[name] = base64.b64encode(data).decode()
+    return texts

@@ -1,4 +1,4 @@
-"""The files of a server: each as an ``.mcz``, the given ones as they are, others when asked for."""
+"""The files of a server: each as an ``.mcz``, given ones unchanged, others converted on request."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ from mcz.sources.text.bones import skeletons_around
 Say = Callable[[str], None]
 Make = Callable[[BinaryIO], None]  # writes an .mcz
 
-MOST_RESULTS = 16  # files made of a clip in view: the oldest goes when there is one more
+MOST_RESULTS = 16  # files converted from a clip in view: the oldest is deleted for a new one
 MOST_UPLOADS = 256  # files that the page gave
 MCZ = ".mcz"
-FACTS = ("rate", "unit", "up")  # which files may not say themselves
-REST = 10  # a folder is looked through again after so many times as long as that took
+FACTS = ("rate", "unit", "up")  # facts that files may lack
+SCAN_FACTOR = 10  # a folder is scanned again after so many times the duration of the last scan
 
 
 class Shelved(Protocol):
-    """A file on the shelf: ``kind`` is the format of what was given, such as "mcz" or "bvh"."""
+    """A file on the shelf: ``kind`` is the format of the given file, such as "mcz" or "bvh"."""
 
     name: str
     kind: str
-    source: str  # the path or URL of what was given
+    source: str  # its path or URL
 
     @property
     def size(self) -> int | None:
-        """Bytes of the ``.mcz``; None while it is not made."""
+        """Bytes of the ``.mcz``; None before it is made."""
         ...
 
     def target(self) -> str:
@@ -53,7 +53,7 @@ class Shelved(Protocol):
         ...
 
     def open(self) -> Contents:
-        """Its bytes; raises as ``target`` does."""
+        """Its bytes; raises as ``target``."""
         ...
 
 
@@ -78,7 +78,7 @@ class Stored:
 
 
 class Remote:
-    """An ``.mcz`` behind a URL, opened when it is first asked for."""
+    """An ``.mcz`` behind a URL, opened on first use."""
 
     kind = "mcz"
 
@@ -102,8 +102,8 @@ class Remote:
         return FarAway(self._source, self._tag)
 
 
-class Made:
-    """An ``.mcz`` that is made of ``source`` when it is first asked for, and when that changes."""
+class Converted:
+    """An ``.mcz`` that is made from ``source`` on first use, and when that changes."""
 
     def __init__(self, shelf: Shelf, name: str, kind: str, source: Path, make: Make) -> None:
         self.name, self.kind = name, kind
@@ -129,7 +129,7 @@ class Made:
         return self._stored.target()
 
     def _look(self) -> None:
-        """Make it where what it is made of has changed; raises AccessError."""
+        """Convert it again if its source has changed; raises AccessError."""
         began = time.monotonic()
         now = _state(Path(self.source), self._shelf.said.get("skeleton"))
         took = time.monotonic() - began
@@ -137,7 +137,7 @@ class Made:
             self._run()
             self._made_of = now
         if self.kind == "folder":  # pages ask for many ranges, and folders may be large
-            self._next_look = time.monotonic() + REST * took
+            self._next_look = time.monotonic() + SCAN_FACTOR * took
 
     def _run(self) -> None:
         before, self._stored, self._error = self._stored, None, None
@@ -158,7 +158,7 @@ class Made:
 def _state(path: Path, skeleton: object = None) -> object:
     """Stamp that changes with a file, a motion file below a folder, or the ASF of an AMC.
 
-    ``skeleton``: the ASF that was named, or None. Raises AccessError where there is no ``path``.
+    ``skeleton``: the named ASF, or None. Raises AccessError where there is no ``path``.
     """
     from mcz.files.editing.folders import files_below, motion_files
 
@@ -168,7 +168,7 @@ def _state(path: Path, skeleton: object = None) -> object:
         raise AccessError(reason_of(error), path=path) from None
     paths = motion_files(files_below(path, None)[0])[0] if is_folder else [path]
     takes = {one.parent: one for one in paths if wants_skeleton(one)}
-    around = [found.path for take in takes.values() for found in skeletons_around(take)]
+    around = [asf.path for take in takes.values() for asf in skeletons_around(take)]
     if takes and isinstance(skeleton, (str, os.PathLike)) and not is_folder:
         around = [Path(skeleton)]
     stamps = {str(one): _stamp(one) for one in (*paths, *around)}
@@ -178,18 +178,18 @@ def _state(path: Path, skeleton: object = None) -> object:
 def _stamp(path: Path) -> tuple[int, int, int] | None:
     """Time of change, size and number of a file; None if it is gone."""
     try:
-        found = path.stat()
+        status = path.stat()
     except (OSError, ValueError):
         return None
-    return found.st_mtime_ns, found.st_size, found.st_ino
+    return status.st_mtime_ns, status.st_size, status.st_ino
 
 
 class Shelf:
-    """Files by number, and the temporary folder of those that were made, gone with ``close``.
+    """Files by number, and a temporary folder of converted ones, deleted by ``close``.
 
-    ``said`` is what files do not say themselves: arguments of ``mcz.encode`` such as ``unit``.
-    ``say`` is told, in a line, of what could not be made. ``salvage``: damaged files are read.
-    ``hints`` words the hints of errors.
+    ``said`` are facts that files lack: arguments of ``mcz.encode`` such as ``unit``. ``say`` gets a
+    line for each failed conversion. ``salvage``: damaged files are read. ``hints`` words the hints
+    of errors.
     """
 
     def __init__(
@@ -215,19 +215,19 @@ class Shelf:
         with self._lock:
             return self._files[number]
 
-    def told(self, motion: Motion) -> Motion:
-        """``motion`` with what is said of files that do not say it; raises OptionError."""
+    def with_facts(self, motion: Motion) -> Motion:
+        """``motion`` with the facts that its file lacks; raises OptionError."""
         rate, unit, up = map(self.said.get, FACTS)
         options = SourceOptions(rate=rate, unit=unit, up=up)
         return options.completing(motion)
 
     def given(self) -> list[tuple[int, Shelved]]:
-        """The files that were there from the beginning, with their numbers."""
+        """The initial files, with their numbers."""
         with self._lock:
             return list(self._files.items())[: self._n_given]
 
     def give(self, file: Shelved) -> None:
-        """Add a file that is there from the beginning."""
+        """Add an initial file."""
         with self._lock:
             self._n_given += 1
             self._add(file)
@@ -238,17 +238,17 @@ class Shelf:
         return number
 
     def upload(self, name: str, kind: str, make: Make) -> tuple[int, Stored]:
-        """Make an ``.mcz`` of what the page gave; raises LimitError where it gave too much."""
+        """Make an ``.mcz`` from an upload; raises LimitError for too many."""
         with self._lock:
             if self._n_uploads >= MOST_UPLOADS:
-                raise LimitError(f"{MOST_UPLOADS} files were given already; start mcz view anew")
+                raise LimitError(f"{MOST_UPLOADS} files were given already; start mcz view again")
             self._n_uploads += 1
         stored = Stored(name, self.write(make), kind)
         with self._lock:
             return self._add(stored), stored
 
     def result(self, name: str, make: Make) -> tuple[int, Stored]:
-        """Make an ``.mcz`` of a clip in view; one of ``MOST_RESULTS`` before it goes."""
+        """Make an ``.mcz`` from a clip in view; the oldest of ``MOST_RESULTS`` is deleted."""
         stored = Stored(name, self.write(make))
         with self._lock:
             number = self._add(stored)
@@ -275,7 +275,7 @@ class Shelf:
         return path
 
     def folder(self) -> Path:
-        """The temporary folder, which nobody else can read; raises OptionError once closed."""
+        """The private temporary folder; raises OptionError once closed."""
         with self._lock:
             if self._is_closed:
                 raise OptionError("the viewer is closed")
@@ -288,7 +288,7 @@ class Shelf:
         return Path(tempfile.mkdtemp(dir=self.folder(), prefix="given-"))
 
     def close(self) -> None:
-        """Take away the temporary folder; what still writes into it finds it gone."""
+        """Delete the temporary folder; a task that still writes into it fails."""
         with self._lock:
             self._is_closed = True
             folder, self._folder = self._folder, None
@@ -321,7 +321,9 @@ def put(shelf: Shelf, path: str) -> None:
     if kind == "mcz":
         shelf.give(Stored(place.name, place))
     else:
-        shelf.give(Made(shelf, place.name, kind, place, lambda out: encode(place, out, shelf.said)))
+        shelf.give(
+            Converted(shelf, place.name, kind, place, lambda out: encode(place, out, shelf.said))
+        )
 
 
 def kind_of(path: Path) -> str:
@@ -334,12 +336,12 @@ def kind_of(path: Path) -> str:
     return known[suffix]
 
 
-def encode(source: Path, out: BinaryIO, said: Params) -> None:
+def encode(source: Path, out: BinaryIO, facts: Params) -> None:
     """Write ``source`` as an ``.mcz``, fast."""
     from mcz.files.writing.file import encode
 
-    skeleton = said.get("skeleton") if wants_skeleton(source) else None
-    encode(source, out, **{**said, "skeleton": skeleton})
+    skeleton = facts.get("skeleton") if wants_skeleton(source) else None
+    encode(source, out, **{**facts, "skeleton": skeleton})
 
 
 def _put_folder(shelf: Shelf, folder: Path) -> None:
@@ -352,18 +354,18 @@ def _put_folder(shelf: Shelf, folder: Path) -> None:
     motions, _ = motion_files(paths)
     if motions:
         name = folder.resolve().name or "motions"
-        shelf.give(Made(shelf, name, "folder", folder, lambda out: pack(folder, out, shelf)))
+        shelf.give(Converted(shelf, name, "folder", folder, lambda out: pack(folder, out, shelf)))
     elif not shelf.given():
         raise OptionError("there is no motion file in it", path=folder)
 
 
 def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
-    """Write all motion files below ``folder`` as one ``.mcz``; what cannot be read is said."""
+    """Write all motion files below ``folder`` as one ``.mcz``; unreadable ones are reported."""
     from mcz.files.editing.archive import pack
     from mcz.model import threads
 
-    said = {key: value for key, value in shelf.said.items() if key != "skeleton"}
-    report = pack(folder, out, jobs=threads.processors(), copies=False, **said)
+    facts = {key: value for key, value in shelf.said.items() if key != "skeleton"}
+    report = pack(folder, out, jobs=threads.processors(), copies=False, **facts)
     for outcome in report.outcomes:
         if outcome.result == "failed":
             shelf.say(worded(outcome.message, shelf.hints))

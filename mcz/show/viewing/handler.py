@@ -1,6 +1,6 @@
-"""One connection to the server: what is asked, checked and answered.
+"""One connection to the server: requests, checks and answers.
 
-tools/viewer/README.md, "The server", has what the page may ask for; nothing else is answered.
+tools/viewer/README.md, "The server", lists the requests of the page; no others are answered.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from mcz.show.viewing.requests import (
 )
 from mcz.show.viewing.server_tasks import Site
 
-PULSE = 1.0  # seconds between two looks at whether a page is still there
+PULSE = 1.0  # seconds between two checks of an open page
 BEAT = 15  # pulses between two signs of life
-IDLE = 120  # seconds in which a connection that is kept has to ask for something
-NOTHING = "default-src 'none'; frame-ancestors 'none'; sandbox"
+IDLE = 120  # seconds of silence after which a kept connection is closed
+STRICT_POLICY = "default-src 'none'; frame-ancestors 'none'; sandbox"
 SAFETY = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
@@ -51,7 +51,7 @@ class Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     timeout = IDLE
     command = "GET"  # until one is read
-    _unread = _has_answered = False  # what is posted; whether an answer has begun
+    _unread = _has_answered = False  # unread posted bytes; an answer has begun
 
     @property
     def _site(self) -> Site:
@@ -67,7 +67,7 @@ class Handler(BaseHTTPRequestHandler):
         self._guarded(self._post, unread=True)
 
     def _guarded(self, answer: Callable[[str], None], *, unread: bool) -> None:
-        """Answer a request that may be answered; say why where it is not."""
+        """Answer an allowed request; answer others with the reason."""
         self._unread, self._has_answered = unread, False
         try:
             answer(self._route())
@@ -92,7 +92,7 @@ class Handler(BaseHTTPRequestHandler):
             raise Refused(404, "there is nothing here")
         return below[1]
 
-    # What is there to get ---------------------------------------------------------
+    # Resources to get ------------------------------------------------------------
 
     def _get(self, path: str) -> None:
         if path == "":
@@ -109,7 +109,6 @@ class Handler(BaseHTTPRequestHandler):
             raise Refused(404, "there is nothing here")
 
     def _file(self, number: int) -> None:
-        """Bytes of a file, or of a part of it."""
         try:
             file = self._site.shelf[number]
         except KeyError:
@@ -121,16 +120,16 @@ class Handler(BaseHTTPRequestHandler):
                 self._head(304, {"ETag": contents.tag, "Cache-Control": "private, no-cache"})
                 return
             start, stop, status = 0, contents.size, 200
-            found = None
+            byte_range = None
             if self.command == "GET":
                 try:
-                    found = range_of(self.headers, contents.size, contents.tag)
+                    byte_range = range_of(self.headers, contents.size, contents.tag)
                 except Refused as refused:
                     size = {"Content-Range": f"bytes */{contents.size}"}
                     self._fail(refused.status, "Refused", str(refused), size)
                     return
-            if found is not None:
-                (start, stop), status = found, 206
+            if byte_range is not None:
+                (start, stop), status = byte_range, 206
                 headers["Content-Range"] = f"bytes {start}-{stop - 1}/{contents.size}"
             headers |= {"Content-Length": str(stop - start), "Content-Type": BYTES}
             self._head(status, {**headers, "Cache-Control": "private, no-cache"})
@@ -167,15 +166,15 @@ class Handler(BaseHTTPRequestHandler):
         except (OSError, ValueError):
             return True
 
-    # What can be done -------------------------------------------------------------
+    # Tasks to post ---------------------------------------------------------------
 
     def _post(self, path: str) -> None:
         work = self._site.work
         if path == "convert":
             size = length_of(self.headers, work.most_posted)
-            found = work.convert(self.rfile, size, self.headers.get("Content-Type", ""))
+            result = work.convert(self.rfile, size, self.headers.get("Content-Type", ""))
             self._unread = False
-            self._send_json(found)
+            self._send_json(result)
             return
         tasks: Mapping[str, Callable[[JsonObject], object]] = {
             "encode": work.encode,
@@ -185,7 +184,7 @@ class Handler(BaseHTTPRequestHandler):
         if path not in tasks:
             raise Refused(404, "there is nothing here")
         if self.headers.get_content_type() != JSON:
-            raise Refused(415, "what is asked for is said as application/json")
+            raise Refused(415, "requests are posted as application/json")
         data = self.rfile.read(length_of(self.headers, LONGEST_JSON))
         self._unread = False
         document = json_of(data)
@@ -196,7 +195,7 @@ class Handler(BaseHTTPRequestHandler):
         else:
             self._send_json(answer)
 
-    # How it is said ---------------------------------------------------------------
+    # Format of answers -----------------------------------------------------------
 
     def _send_json(self, document: object) -> None:
         self._send(json.dumps(document, allow_nan=False).encode(), JSON, 200)
@@ -212,7 +211,7 @@ class Handler(BaseHTTPRequestHandler):
     def _head(self, status: int, headers: Mapping[str, str]) -> None:
         self._has_answered = True
         is_page = headers.get("Content-Type", "").startswith("text/html")
-        policy = f"{self._site.page.policy}; frame-ancestors 'none'" if is_page else NOTHING
+        policy = f"{self._site.page.policy}; frame-ancestors 'none'" if is_page else STRICT_POLICY
         self.send_response(status)
         for name, value in {**headers, **SAFETY, "Content-Security-Policy": policy}.items():
             self.send_header(name, value)
@@ -223,7 +222,7 @@ class Handler(BaseHTTPRequestHandler):
     def _fail(
         self, status: int, kind: str, text: str, more: Mapping[str, str] | None = None
     ) -> None:
-        """Say what went wrong, unless the answer has begun."""
+        """Send the error, unless the answer has begun."""
         self.close_connection = self.close_connection or self._unread
         if self._has_answered:
             self.close_connection = True
@@ -241,4 +240,4 @@ class Handler(BaseHTTPRequestHandler):
         return "mcz"
 
     def log_message(self, format: str, *args: object) -> None:
-        """Nothing: who asks for what is nobody's business."""
+        """Log nothing, for privacy."""

@@ -1,4 +1,4 @@
-"""The page: where it is, what it may do, and the place in it for files."""
+"""The page: its text, its permissions, and the place in it for files."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from mcz.errors import AccessError, FormatError, reason_of
 from mcz.show.viewing.file_registry import Say
 
 PACKAGED = Path(__file__).with_name("viewer.html")  # in a wheel that was built with it
-OTHER = "MCZ_VIEWER_PAGE"  # an environment variable: a page to be taken in place of ours
+OTHER = "MCZ_VIEWER_PAGE"  # an environment variable: a page to use instead of ours
 PLACE = "<!-- mcz:embedded -->"
 END = "<!-- mcz:end -->"
 POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy" content="([^"<>]*)"')
 
 
 class Page:
-    """The text of the page, and ``policy``, what browsers let it do.
+    """The text of the page, and ``policy``, its permissions in browsers.
 
-    What it holds at ``PLACE`` when it is opened by itself, the tables of all codecs, is no part of
-    ``text``: a server has them, and pages that are written have what their files need.
+    The page on disk has the tables of all codecs at ``PLACE``, which ``text`` lacks: a server has
+    them, and written pages have those that their files need.
     """
 
     def __init__(self, text: str, name: str = "the page") -> None:
-        before, found, rest = text.partition(PLACE)
+        before, separator, rest = text.partition(PLACE)
         _, end, after = rest.partition(END)
         policy = POLICY.search(before)
-        if not found or not end or PLACE in after or policy is None:
+        if not separator or not end or PLACE in after or policy is None:
             raise FormatError(f"{name}: it is no page of the viewer of this version")
         self.text = before + PLACE + END + after
         self.before, self.after, self.policy = before, after, policy[1]
 
 
 def page(say: Say | None = None) -> Page:
-    """The page of this installation; in a source checkout it is built where that is due.
+    """The page of this installation; in a source checkout it is built if outdated.
 
-    ``say`` is told what takes time. Raises AccessError where there is none; the message says how
-    one is made.
+    ``say`` gets a line for slow steps. Raises AccessError if there is none; the message explains
+    how to build one.
     """
     if other := os.environ.get(OTHER):
         path = Path(other)
@@ -59,13 +59,13 @@ ROOT = Path(__file__).parents[3]
 VIEWER = "tools/viewer"
 COMMAND = f"(cd {VIEWER} && npm ci && npm run build)"
 INSTALL = ("ci", "--no-audit", "--no-fund")
-SHOWN = 300  # characters of what a program that failed has said last
+SHOWN = 300  # last characters of the output of a failed program
 
 
 def built(say: Callable[[str], None], root: Path = ROOT) -> Path:
-    """The page that is built from the sources below ``root``; raises AccessError without one.
+    """The page built from the sources below ``root``; raises AccessError without one.
 
-    It is built with npm where it is older than its sources. Without npm an old one is taken.
+    npm builds it if it is older than its sources. Without npm an old one is used.
     """
     folder = root / VIEWER
     page = folder / "dist" / "viewer.html"
@@ -115,6 +115,6 @@ def _run(words: list[str], folder: Path) -> None:
         words, cwd=folder, capture_output=True, stdin=subprocess.DEVNULL, check=False
     )
     if done.returncode:
-        said = " ".join((done.stderr or done.stdout).decode("utf-8", "replace").split())[-SHOWN:]
+        message = " ".join((done.stderr or done.stdout).decode("utf-8", "replace").split())[-SHOWN:]
         command = " ".join([Path(words[0]).name, *words[1:]])
-        raise AccessError(f"the page could not be built: {command} in {folder} said: {said}")
+        raise AccessError(f"the page could not be built: {command} in {folder} said: {message}")

@@ -1,4 +1,4 @@
-"""A motion as a small player for notebooks: HTML of at most 300 kB that needs nothing else.
+"""A motion as a small player for notebooks: self-contained HTML of at most 300 kB.
 
 It runs in a frame of its own, which can reach neither the notebook nor a network.
 """
@@ -34,12 +34,12 @@ MOST_BYTES = 300_000
 SPARE = 500  # bytes that numbers may have more than they had in the first try
 TIME_BYTES = 12  # of the time of a frame, as text
 HEIGHT = 420  # pixels
-UNKNOWN_RATE = 30.0  # frames a second of a motion that does not say
+UNKNOWN_RATE = 30.0  # frames a second of a motion without a rate
 PLACE = "/*data*/null"
 
 
 def player(moving: Moving) -> str:
-    """The HTML of a Motion or Clip; where nothing can be drawn, what it is and why not."""
+    """The HTML of a Motion or Clip; if it cannot be drawn, its summary and the reason."""
     try:
         return _player(moving)
     except MczError as error:
@@ -57,25 +57,25 @@ def _player(moving: Moving) -> str:
     empty = Drawn(nothing, 1.0, frames_read(moving), frames_read(moving), 0, 0.0, 0.0)
     room = MOST_BYTES - SPARE - len(_frame(moving, lines, empty, rate))
     most = room * 3 // 4 // (6 * n_points + TIME_BYTES)
-    found = drawn(moving, max(1, most), max(1, int(rate // RATE)))
-    return _frame(moving, lines, found, rate)
+    drawing = drawn(moving, max(1, most), max(1, int(rate // RATE)))
+    return _frame(moving, lines, drawing, rate)
 
 
-def _frame(moving: Moving, lines: Figure, found: Drawn, rate: float) -> str:
+def _frame(moving: Moving, lines: Figure, drawing: Drawn, rate: float) -> str:
     document = {
-        "caption": _caption(moving, found),
-        "positions": base64.b64encode(found.words.tobytes()).decode(),
-        "frames": len(found.words),
-        "every": found.every,
+        "caption": _caption(moving, drawing),
+        "positions": base64.b64encode(drawing.words.tobytes()).decode(),
+        "frames": len(drawing.words),
+        "every": drawing.every,
         "total": moving.n_frames,
-        "rate": rate / found.every,
-        "times": _times(moving, found),
-        "step": found.step,
+        "rate": rate / drawing.every,
+        "times": _times(moving, drawing),
+        "step": drawing.step,
         "bones": lines.bones,
         "sides": lines.sides,
-        "up": found.up,
-        "floor": found.floor,
-        "radius": found.radius,
+        "up": drawing.up,
+        "floor": drawing.floor,
+        "radius": drawing.radius,
     }
     data = json.dumps(document, separators=(",", ":")).replace("<", "\\u003c")
     page = html.escape(_template().replace(PLACE, data))
@@ -85,22 +85,22 @@ def _frame(moving: Moving, lines: Figure, found: Drawn, rate: float) -> str:
     )
 
 
-def _times(moving: Moving, found: Drawn) -> list[float] | None:
+def _times(moving: Moving, drawing: Drawn) -> list[float] | None:
     """The times of the drawn frames to a millisecond, None where they are unknown."""
     if moving.timeline is None:
         return None
-    times = moving.timeline.times[:: found.every][: len(found.words)]
+    times = moving.timeline.times[:: drawing.every][: len(drawing.words)]
     return [round(float(time), 3) for time in times]
 
 
-def _caption(moving: Moving, found: Drawn) -> str:
+def _caption(moving: Moving, drawing: Drawn) -> str:
     rate = moving.frame_rate
     text = f"{shown(moving.name)}: {counted(moving.n_frames, 'frame')}"
     text += " at an unknown rate" if rate is None else f" at {float(rate):g} Hz"
-    if found.n_read < moving.n_frames:
-        text += f"; frames 0 to {found.n_read - 1} are shown"
-    if found.every > 1:
-        text += f"; one frame in {found.every} is drawn"
+    if drawing.n_read < moving.n_frames:
+        text += f"; frames 0 to {drawing.n_read - 1} are shown"
+    if drawing.every > 1:
+        text += f"; one frame in {drawing.every} is drawn"
     return text
 
 
@@ -112,10 +112,10 @@ def _template() -> str:
 MOST_POINTS = 4096
 MOST_READ = 3000  # frames of a clip that are decoded to show some of them
 MOST_NUMBERS = 2**21  # likewise, of all channels
-RATE = 30.0  # frames a second that are enough; the player draws what lies between two
-MISSING = -32768  # the word of a coordinate that is not known
+RATE = 30.0  # sufficient frames a second; the player interpolates
+MISSING = -32768  # the word of an unknown coordinate
 LARGEST = 32767
-FAR = 1e100  # what is farther away is missing: nothing else would be seen beside it
+FARTHEST = 1e100  # farther coordinates count as missing: they would hide all others
 Words = NDArray[np.int16]
 Moving: TypeAlias = Motion | Clip
 
@@ -130,7 +130,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """Words of (frames, points, 3), each ``step`` length units from the middle of what is seen.
+    """Words of (frames, points, 3), each ``step`` length units from the middle of the scene.
 
     Every ``every``-th of the first ``n_read`` frames. ``floor`` is the lowest coordinate along the
     axis ``up``, ``radius`` the greatest of all, both counted from the middle.
@@ -146,7 +146,7 @@ class Drawn:
 
 
 def figure(skeleton: Skeleton) -> Figure:
-    """The lines and sides; raises MotionError where there is no point, or too many to draw."""
+    """The lines and sides; raises MotionError without points, or for too many."""
     points = list(listed_points(skeleton))
     if not 0 < len(points) <= MOST_POINTS:
         why = f"at most {MOST_POINTS:,} are drawn" if points else "there is nothing to draw"
@@ -156,7 +156,7 @@ def figure(skeleton: Skeleton) -> Figure:
 
 
 def drawn(moving: Moving, most_frames: int, every: int = 1) -> Drawn:
-    """At most ``most_frames`` frames of a Motion or Clip; raises MczError for what has no points.
+    """At most ``most_frames`` frames of a Motion or Clip; raises MczError for one without points.
 
     ``every`` is the least distance of two of them.
     """
@@ -164,7 +164,7 @@ def drawn(moving: Moving, most_frames: int, every: int = 1) -> Drawn:
     n_read = frames_read(moving)
     every = max(every, -(-n_read // max(1, most_frames)))
     places = positions_of(skeleton, _values(moving, n_read, every))
-    places[~(np.abs(places) < FAR).all(axis=2)] = np.nan
+    places[~(np.abs(places) < FARTHEST).all(axis=2)] = np.nan
     axis = skeleton.up_axis or "y"
     places *= signs_of(axis)
     words, step, middle = _words(places)
@@ -184,7 +184,9 @@ def frames_read(moving: Moving) -> int:
 def _values(moving: Moving, n_read: int, every: int) -> NDArray[np.float64]:
     """Every so many frames, (n, n_channels), NaN where invalid."""
     if not moving.signals[0].has_poses:
-        raise MotionError("its channels are not those of its skeleton", clip=moving.name)
+        raise MotionError(
+            "the channels of its motion signal differ from those of its skeleton", clip=moving.name
+        )
     if isinstance(moving, Motion):
         signal = moving.signals[0]
         values = np.asarray(signal.values[:n_read:every], np.float64)
@@ -194,7 +196,7 @@ def _values(moving: Moving, n_read: int, every: int) -> NDArray[np.float64]:
 
 
 def _words(places: NDArray[np.float64]) -> tuple[Words, float, NDArray[np.float64]]:
-    """Coordinates as words, what one is worth, and the middle that they count from, (3,)."""
+    """Coordinates as words, the size of a step, and the middle that they count from, (3,)."""
     known = places[np.isfinite(places).all(axis=2)]
     if not len(known):
         return np.full(places.shape, MISSING, "<i2"), 1.0, np.zeros(3)
@@ -209,17 +211,17 @@ def _words(places: NDArray[np.float64]) -> tuple[Words, float, NDArray[np.float6
 def lines_of(skeleton: Skeleton) -> list[tuple[int, int]]:
     """The points at both ends of each line: of a joint and its parent, and of its end sites.
 
-    Pictures have nodes (``mcz.show.pictures.bodies``), which show origins that are no points, too.
+    Pictures have nodes (``mcz.show.pictures.bodies``), which include origins that are not points.
     """
     firsts = first_points(skeleton)
-    found = []
+    pairs = []
     for point, (joint, _) in enumerate(listed_points(skeleton)):
         parent = skeleton.joints[joint].parent
         if point != firsts[joint] and skeleton.intrinsic:
-            found.append((firsts[joint], point))
+            pairs.append((firsts[joint], point))
         elif parent >= 0:
-            found.append((firsts[parent], point))
-    return found
+            pairs.append((firsts[parent], point))
+    return pairs
 
 
 MOST_CLIPS = 12  # players on a page, of at most 300 kB each
@@ -237,10 +239,9 @@ TEMPLATE = """<!doctype html>
 
 
 def viewer_page(shelf: Shelf) -> Page:
-    """Return the viewer's page, or a small one where this installation has none.
+    """Return the viewer's page, or a small one if this installation has none.
 
-    The reason is told to ``shelf.say``. Raises AccessError where the environment names a page that
-    is not there.
+    ``shelf.say`` gets the reason. Raises AccessError if the environment names a missing page.
     """
     try:
         return page(shelf.say)

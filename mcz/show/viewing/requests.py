@@ -23,7 +23,7 @@ Headers = Message  # of a request, as http.server parses it
 
 
 class Refused(Exception):
-    """A request that is not answered as asked: an HTTP status, and a sentence that says why."""
+    """A refused request: an HTTP status, and a sentence with the reason."""
 
     def __init__(self, status: int, why: str) -> None:
         super().__init__(why)
@@ -33,8 +33,8 @@ class Refused(Exception):
 def check_sender(headers: Headers, port: int) -> None:
     """Raise Refused unless a request came to this server by its own name, and from its own page.
 
-    A name that was made to mean this machine (DNS rebinding) stands in Host; a page of another
-    origin in Origin, or in what browsers say of themselves (Sec-Fetch-Site).
+    A foreign name for this machine (DNS rebinding) is in Host; a page of another origin in Origin,
+    or in the metadata of browsers (Sec-Fetch-Site).
     """
     hosts = [f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]")]
     host = headers.get_all("Host", [])
@@ -50,11 +50,10 @@ def check_sender(headers: Headers, port: int) -> None:
 
 
 def range_of(headers: Headers, size: int, tag: str) -> tuple[int, int] | None:
-    """The one range of bytes, start and stop, that a GET asks for of ``size``; None: all.
+    """The range of bytes, start and stop, that a GET requests of ``size``; None: all.
 
-    What is no range of bytes, and several at once, are no reason not to answer: RFC 9110 has all
-    sent then. So it does where ``If-Range`` names other bytes. Raises Refused (416) for one that
-    begins behind the end.
+    By RFC 9110 all bytes are sent for a malformed range, for several ranges, and if ``If-Range``
+    names other bytes. Raises Refused (416) for a range that begins after the end.
     """
     if headers.get("If-Range", tag) != tag:
         return None
@@ -70,7 +69,7 @@ def range_of(headers: Headers, size: int, tag: str) -> tuple[int, int] | None:
                 return None
             stop = min(size, int(match[2]) + 1)
     if start >= stop:
-        raise Refused(416, f"the range begins behind the end, at {size}")
+        raise Refused(416, f"the range begins after the end, at {size}")
     return start, stop
 
 
@@ -80,9 +79,9 @@ def is_known(headers: Headers, tag: str) -> bool:
 
 
 def check_same(headers: Headers, tag: str) -> None:
-    """Raise Refused (412) where the sender wants other bytes than these (If-Match)."""
-    wanted = headers.get("If-Match")
-    if wanted is not None and wanted != "*" and tag not in _tags(wanted):
+    """Raise Refused (412) if the sender requires other bytes (If-Match)."""
+    tags = headers.get("If-Match")
+    if tags is not None and tags != "*" and tag not in _tags(tags):
         raise Refused(412, "the file has changed meanwhile")
 
 
@@ -95,15 +94,15 @@ def _tags(text: str) -> list[str]:
 
 
 def length_of(headers: Headers, most: int) -> int:
-    """The bytes that a request posts; raises Refused where that is not said, or is too much."""
-    said = headers.get_all("Content-Length", [])
-    if headers.get("Transfer-Encoding") is not None or len(said) != 1:
+    """The number of posted bytes; raises Refused if it is not stated, or too large."""
+    lengths = headers.get_all("Content-Length", [])
+    if headers.get("Transfer-Encoding") is not None or len(lengths) != 1:
         raise Refused(411, "the request must say its Content-Length")
-    if not re.fullmatch(r"[0-9]{1,15}", said[0]):
-        raise Refused(400, "Content-Length is no number")
-    if int(said[0]) > most:
-        raise Refused(413, f"the request has {int(said[0]):,} bytes, at most {most:,} are taken")
-    return int(said[0])
+    if not re.fullmatch(r"[0-9]{1,15}", lengths[0]):
+        raise Refused(400, "Content-Length is not a number")
+    if int(lengths[0]) > most:
+        raise Refused(413, f"the request has {int(lengths[0]):,} bytes, at most {most:,} are taken")
+    return int(lengths[0])
 
 
 def json_of(data: bytes) -> JsonObject:
@@ -111,25 +110,25 @@ def json_of(data: bytes) -> JsonObject:
     try:
         document = json.loads(data)
     except (ValueError, RecursionError):
-        raise Refused(400, "the request is no JSON") from None
+        raise Refused(400, "the request is not JSON") from None
     if not isinstance(document, dict):
-        raise Refused(400, "the request is no object of JSON")
+        raise Refused(400, "the request is not an object of JSON")
     return document
 
 
 def text_of(document: Params, key: str) -> str:
-    """A text of an object; raises Refused where it is none."""
+    """A text of an object; raises Refused for another type."""
     value = document.get(key)
     if not isinstance(value, str) or not value:
-        raise Refused(400, f"{key} is no text")
+        raise Refused(400, f"{key} is not a text")
     return value
 
 
 def object_of(document: Params, key: str) -> JsonObject:
-    """An object in an object; raises Refused where it is none."""
+    """An object in an object; raises Refused for another type."""
     value = document.get(key)
     if not isinstance(value, dict):
-        raise Refused(400, f"{key} is no object")
+        raise Refused(400, f"{key} is not an object")
     return value
 
 
@@ -137,7 +136,7 @@ def params_of(document: Params) -> JsonObject:
     """The parameters of a codec by name: texts, numbers and truths, no null; raises Refused."""
     given = document.get("params") or {}
     if not isinstance(given, dict) or len(given) > MOST_PARAMS:
-        raise Refused(400, "params is no object of parameters")
+        raise Refused(400, "params is not an object of parameters")
     params = {key: value for key, value in given.items() if value is not None}
     for key, value in params.items():
         if not isinstance(value, str | int | float | bool):
@@ -163,19 +162,19 @@ def boundary_of(content_type: str) -> bytes:
 
 
 def save_files(stream: Readable, size: int, boundary: bytes, folder: Path) -> list[Path]:
-    """Write the files of a form of ``size`` bytes below ``folder``; return where each is.
+    """Write the files of a form of ``size`` bytes below ``folder``; return their paths.
 
-    Fields that are no files are passed over. Raises Refused for what is no form, for more than
-    ``MOST_PARTS`` parts, and for two files of one name.
+    Fields other than files are skipped. Raises Refused for a bad form, for more than ``MOST_PARTS``
+    parts, and for two files of one name.
     """
     body = _Body(stream, size, b"\r\n--" + boundary)
     for _ in body.until_delimiter():
-        pass  # what stands before the first part says nothing
-    found: list[Path] = []
+        pass  # the text before the first part is ignored
+    paths: list[Path] = []
     for _ in range(MOST_PARTS):
         after = body.take(2)
         if after == b"--":
-            return found
+            return paths
         if after != b"\r\n":
             raise Refused(400, "the form has a boundary that is followed by something else")
         name = FILE_NAME.search(body.head())
@@ -183,7 +182,7 @@ def save_files(stream: Readable, size: int, boundary: bytes, folder: Path) -> li
             for _ in body.until_delimiter():
                 pass
             continue
-        found.append(_save(body, folder, path_of(name[1])))
+        paths.append(_save(body, folder, path_of(name[1])))
     raise Refused(413, f"the form has more than {MOST_PARTS:,} parts")
 
 
@@ -192,7 +191,7 @@ def _save(body: _Body, folder: Path, name: str) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         stream = path.open("xb")
-    except OSError:  # it is there, or a folder is
+    except OSError:  # a file or folder of that name exists
         raise Refused(400, "two files of the form have one name") from None
     with stream:
         for piece in body.until_delimiter():
@@ -201,7 +200,7 @@ def _save(body: _Body, folder: Path, name: str) -> Path:
 
 
 def path_of(name: bytes) -> str:
-    """The path that a browser gives a file, in which nothing leads out of a folder.
+    """The path that a browser gives a file, made to stay inside a folder.
 
     >>> path_of(b"walks/05 (a).amc"), path_of(b"/../x//b.bvh"), path_of(b"C:\\\\a.bvh")
     ('walks/05 (a).amc', '__/x/b.bvh', 'C_/a.bvh')
@@ -221,10 +220,10 @@ class _Body:
 
     def __init__(self, stream: Readable, size: int, delimiter: bytes) -> None:
         self._stream, self._left, self._delimiter = stream, size, delimiter
-        self._held = b"\r\n"  # so that the first boundary is one like all others
+        self._held = b"\r\n"  # so that the first boundary looks like all others
 
-    def _more(self) -> None:
-        """Hold a piece more; raises Refused at the end of the form."""
+    def _read_more(self) -> None:
+        """Read another piece; raises Refused at the end of the form."""
         piece = self._stream.read(min(PIECE, self._left)) if self._left else b""
         if not piece:
             raise Refused(400, "the form ends in a part")
@@ -233,7 +232,7 @@ class _Body:
 
     def take(self, size: int) -> bytes:
         while len(self._held) < size:
-            self._more()
+            self._read_more()
         taken, self._held = self._held[:size], self._held[size:]
         return taken
 
@@ -242,20 +241,20 @@ class _Body:
         while (end := self._held.find(b"\r\n\r\n")) < 0:
             if len(self._held) > LONGEST_HEAD:
                 raise Refused(400, "a part of the form has headers that are too long")
-            self._more()
+            self._read_more()
         if end > LONGEST_HEAD:
             raise Refused(400, "a part of the form has headers that are too long")
         head, self._held = self._held[:end], self._held[end + 4 :]
         return head
 
     def until_delimiter(self) -> Iterator[bytes]:
-        """The content of a part in pieces; the delimiter behind it is passed."""
+        """The content of a part in pieces; the delimiter after it is consumed."""
         while (end := self._held.find(self._delimiter)) < 0:
-            kept = len(self._delimiter) - 1  # of which the delimiter may have begun
+            kept = len(self._delimiter) - 1  # the delimiter may have begun in them
             if len(self._held) > kept:
                 piece, self._held = self._held[:-kept], self._held[-kept:]
                 yield piece
-            self._more()
+            self._read_more()
         piece, self._held = self._held[:end], self._held[end + len(self._delimiter) :]
         yield piece
 
@@ -264,13 +263,13 @@ READ_SIZE = 2**18  # bytes that are in memory at a time
 
 
 class Contents(Protocol):
-    """Bytes whose ``size`` and strong ``tag`` were taken when they were opened."""
+    """Bytes whose ``size`` and strong ``tag`` are fixed when they are opened."""
 
     size: int
     tag: str
 
     def pieces(self, start: int, stop: int) -> Iterator[bytes]:
-        """Bytes start <= b < stop in pieces; fewer where the file has become shorter meanwhile."""
+        """Bytes start <= b < stop in pieces; fewer if the file has become shorter meanwhile."""
         ...
 
     def close(self) -> None: ...
@@ -284,9 +283,9 @@ class OnDisk:
             self._stream = open(path, "rb")  # noqa: SIM115 (closed by close)
         except (OSError, ValueError) as error:
             raise AccessError(reason_of(error), path=path) from None
-        found = os.fstat(self._stream.fileno())
-        self.size = found.st_size
-        self.tag = f'"{found.st_size:x}-{found.st_mtime_ns:x}-{found.st_ino:x}"'
+        status = os.fstat(self._stream.fileno())
+        self.size = status.st_size
+        self.tag = f'"{status.st_size:x}-{status.st_mtime_ns:x}-{status.st_ino:x}"'
 
     def pieces(self, start: int, stop: int) -> Iterator[bytes]:
         self._stream.seek(start)
@@ -299,7 +298,7 @@ class OnDisk:
 
 
 class FarAway:
-    """A file behind a URL, which its source reads by ranges; it does not change while open."""
+    """A file behind a URL, read by ranges; it does not change while open."""
 
     def __init__(self, source: ByteSource, tag: str) -> None:
         self._source, self.size, self.tag = source, source.size, tag
@@ -312,4 +311,4 @@ class FarAway:
                 start += size
 
     def close(self) -> None:
-        """Nothing: others read the source, too."""
+        """Keep the source open, which others read too."""

@@ -1,4 +1,4 @@
-"""The server of the page: on this machine alone, below a path that nobody can guess."""
+"""The server of the page: on this machine only, below an unguessable path."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mcz.show.viewing.handler import Handler
 from mcz.show.viewing.page import Page
 from mcz.show.viewing.server_tasks import Site, Visitors, Work, lossy_codecs
 
-GRACE = 5.0  # seconds that a page has to come back, as when it is loaded anew
+GRACE = 5.0  # seconds in which a page may come back, such as on a reload
 MOST_CONNECTIONS = 128
 HOSTS = {"127.0.0.1": "127.0.0.1", "localhost": "127.0.0.1", "::1": "::1"}
 
@@ -26,14 +26,14 @@ HOSTS = {"127.0.0.1": "127.0.0.1", "localhost": "127.0.0.1", "::1": "::1"}
 class Server(ThreadingHTTPServer):
     """Serves ``page`` and the files of ``shelf`` from a thread until it is closed; a context.
 
-    ``host`` is a name of this machine's own (127.0.0.1, localhost, ::1), ``port`` 0 any that is
-    free. Raises OptionError for another host, AccessError where the port cannot be had.
+    ``host`` is a name of this machine (127.0.0.1, localhost, ::1), ``port`` 0 any free one. Raises
+    OptionError for another host, AccessError if the port is not available.
     """
 
     daemon_threads = True
     block_on_close = False
     request_queue_size = 64
-    allow_reuse_address = os.name == "posix"  # elsewhere others could take the port, too
+    allow_reuse_address = os.name == "posix"  # elsewhere others could take the port too
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class Server(ThreadingHTTPServer):
         Thread(target=lossy_codecs, daemon=True).start()  # half a second, while the page loads
 
     def server_bind(self) -> None:
-        """Without asking a name server what this machine is called."""
+        """Bind without asking a name server for the name of this machine."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = "mcz", int(self.server_address[1])
 
@@ -79,7 +79,7 @@ class Server(ThreadingHTTPServer):
         self.close()
 
     def close(self) -> None:
-        """Answer nobody any longer; the files that were made are gone then."""
+        """Stop answering, and delete converted files."""
         self.site.visitors.close()
         with suppress(OSError):
             self.shutdown()
@@ -88,7 +88,7 @@ class Server(ThreadingHTTPServer):
         self.site.shelf.close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer in a thread of its own, or not at all where there are too many."""
+        """Answer in a new thread, or not at all if there are too many."""
         if not self._free.acquire(blocking=False):
             self.shutdown_request(request)
             return
@@ -105,6 +105,6 @@ class Server(ThreadingHTTPServer):
             self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Report faults of the server; ignore clients that went away."""
+        """Report faults of the server; ignore clients that disconnected."""
         if not isinstance(sys.exc_info()[1], OSError):
             super().handle_error(request, client_address)

@@ -38,15 +38,15 @@ from mcz.show.viewing.requests import (
 )
 from mcz.sources import FORMATS
 
-MOST_POSTED = 2**30  # bytes of the files that the page may give at once
+MOST_POSTED = 2**30  # bytes of the files of an upload
 MOST_WAITING = 8  # requests that wait for their turn
 MOST_HELD, HELD_BYTES = 2, 2**28  # decoded motions that are at hand, and bytes of each at most
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
-OWN_BASES = "basis"  # the one parameter that may name a file
+OWN_BASES = "basis"  # the only parameter that may name a file
 
 
 class Work:
-    """The tasks of a server, one at a time: each of them uses all processors by itself."""
+    """The tasks of a server, one at a time: each of them uses all processors."""
 
     most_posted = MOST_POSTED
 
@@ -57,13 +57,13 @@ class Work:
 
     @contextmanager
     def turn(self, is_gone: Callable[[], bool] = lambda: False) -> Iterator[None]:
-        """Wait until it is one's turn; Refused where many wait, or nobody wants it any longer."""
+        """Wait for a turn; Refused if too many wait, or the client has left."""
         if not self._waiting.acquire(blocking=False):
             raise Refused(503, "too much is asked for at once")
         try:
             with self._turn:
                 if is_gone():
-                    raise Refused(499, "nobody waits for the answer")
+                    raise Refused(499, "the client has left")
                 yield
         finally:
             self._waiting.release()
@@ -83,7 +83,7 @@ class Work:
         }
 
     def files(self) -> list[JsonObject]:
-        """The files that were given; the size of one that is not made yet is None."""
+        """The initial files; the size of one that is not converted yet is None."""
         return [
             {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
             for number, file in self._shelf.given()
@@ -101,7 +101,7 @@ class Work:
             raise Refused(507, f"the files could not be kept: {error.strerror}") from None
         except MczError as error:
             if error.path is not None:
-                error.path = error.path.removeprefix(f"{folder}{os.sep}")  # which nobody knows
+                error.path = error.path.removeprefix(f"{folder}{os.sep}")  # a private path
             raise
         finally:
             shutil.rmtree(folder, ignore_errors=True)
@@ -115,7 +115,7 @@ class Work:
             raise OptionError("an .mcz needs no converting; the page reads it")
         if len(motions) == 1:
             name, kind = motions[0].name, kinds[0]
-            make = partial(encode, motions[0], said=self._shelf.said)
+            make = partial(encode, motions[0], facts=self._shelf.said)
         else:
             name, kind = f"{len(motions)} files", "folder"
             make = partial(pack, folder, shelf=self._shelf)
@@ -123,7 +123,7 @@ class Work:
         return {"url": url_of(number), "name": name, "size": stored.size}
 
     def encode(self, asked: Params) -> JsonObject:
-        """Code a clip anew with a codec and its parameters; say what that makes of it."""
+        """Encode a clip again with a codec and its parameters; report the result."""
         from mcz.codecs import codec_by_name
         from mcz.files.reading.sizes import clip_sizes
         from mcz.files.writing.file import write
@@ -163,8 +163,8 @@ class Work:
         ratios = []
         for side in sides:
             with self._opened(side) as (file, clip):
-                found = clip_ratios(file, clip)
-                ratios.append({key: found[key] for key in RATIOS})
+                ratios_of_clip = clip_ratios(file, clip)
+                ratios.append({key: ratios_of_clip[key] for key in RATIOS})
         one, other = map(self._motion, sides)
         document = diff_document(one, other, by_joint=True)
         document |= {"differences": document_of(one, other)}
@@ -178,8 +178,8 @@ class Work:
         if writer is None:
             raise Refused(501, "this version writes no GLB")
         rate = asked.get("rate")
-        found: bytes = writer(self._motion(asked), rate=rate).data
-        return found
+        data: bytes = writer(self._motion(asked), rate=rate).data
+        return data
 
     def _file(self, asked: Params) -> Shelved:
         match = re.fullmatch(r"files/([0-9]{1,9})", text_of(asked, "url"))
@@ -190,29 +190,28 @@ class Work:
 
     @contextmanager
     def _opened(self, asked: Params) -> Iterator[tuple[File, Clip]]:
-        """The file and the clip, by name or by its place in the file, that are asked for."""
-        wanted = asked.get("clip")
+        clip_key = asked.get("clip")
         with mcz_open(self._file(asked).target(), salvage=self._shelf.salvage) as file:
-            if isinstance(wanted, int) and not isinstance(wanted, bool):
-                if not 0 <= wanted < len(file):
-                    raise Refused(404, f"the file has {len(file)} clips, not {wanted}")
-                yield file, next(islice(file, wanted, None))
-            elif wanted is None or isinstance(wanted, str):
-                yield file, file.only_clip(wanted or None)
+            if isinstance(clip_key, int) and not isinstance(clip_key, bool):
+                if not 0 <= clip_key < len(file):
+                    raise Refused(404, f"the file has {len(file)} clips, not {clip_key}")
+                yield file, next(islice(file, clip_key, None))
+            elif clip_key is None or isinstance(clip_key, str):
+                yield file, file.only_clip(clip_key or None)
             else:
                 raise Refused(400, "clip is neither a name nor a number")
 
     def _motion(self, asked: Params) -> Motion:
-        """The motion of a clip; those that were decoded last are at hand."""
+        """The motion of a clip; the last decoded ones are cached."""
         file = self._file(asked)
         with closing(file.open()) as contents:
             key = (asked["url"], contents.tag, asked.get("clip"))
-        for held, motion in self._held:
-            if held == key:
+        for cached_key, motion in self._held:
+            if cached_key == key:
                 return motion
         with self._opened(asked) as (_, clip):
             motion = clip.motion()
-        motion = self._shelf.told(motion)
+        motion = self._shelf.with_facts(motion)
         if sum(signal.values.nbytes for signal in motion.signals) <= HELD_BYTES:
             self._held.append((key, motion))
         return motion
@@ -227,8 +226,7 @@ def url_of(number: int) -> str:
 def lossy_codecs() -> list[JsonObject]:
     """Lossy codecs for a slider: their parameters, and the range of the dial.
 
-    The keys are those of ``mcz codecs --json``, and ``dial``. The one that is called "lossy" is the
-    first.
+    The keys are those of ``mcz codecs --json``, and ``dial``. The one called "lossy" is first.
     """
     from mcz.codecs import CODECS, codec_by_name
 
@@ -240,7 +238,7 @@ def lossy_codecs() -> list[JsonObject]:
 
 
 def dial_of(dial: Dial | None) -> JsonObject | None:
-    """The one parameter that trades quality for size, and between what it may lie."""
+    """The parameter that trades quality for size, and its range."""
     if dial is None:
         return None
     return {
@@ -253,7 +251,7 @@ def dial_of(dial: Dial | None) -> JsonObject | None:
 
 
 def refuse_files(params: Params) -> None:
-    """Raise OptionError for a parameter that names a file of this machine, not one of ours."""
+    """Raise OptionError for a parameter that names a file of this machine, except our own."""
     name = params.get(OWN_BASES)
     if isinstance(name, str) and not re.fullmatch(r"[a-z0-9_]{1,40}", name):
         raise OptionError(f"{OWN_BASES}: the page cannot name files of this machine")
@@ -280,11 +278,11 @@ class Site:
     port: int = 0
 
 
-PULSE = 0.5  # seconds between two looks, so that Ctrl-C is heard on every system
+PULSE = 0.5  # seconds between two checks, so that Ctrl-C works on every system
 
 
 class Visitors:
-    """A context is a page that is open; ``grace``: seconds in which one may come back."""
+    """A context is an open page; ``grace``: seconds in which one may come back."""
 
     def __init__(self, grace: float) -> None:
         self._grace = grace
@@ -305,21 +303,21 @@ class Visitors:
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Let everybody who waits go on."""
+        """Release all waiting threads."""
         with self._changed:
             self.is_closing = True
             self._changed.notify_all()
 
     def stay(self, seconds: float) -> bool:
-        """Wait so long; whether the page may stay open then."""
+        """Wait so long; return whether the page may stay open."""
         with self._changed:
             self._changed.wait_for(lambda: self.is_closing, seconds)
             return not self.is_closing
 
     def wait(self, *, for_ever: bool = False) -> None:
-        """Wait until a page was there and all have been gone for the time of grace.
+        """Wait until a page was open and all have been closed for the time of grace.
 
-        ``for_ever``: until ``close``, whoever comes and goes.
+        ``for_ever``: until ``close``.
         """
         with self._changed:
             while not self.is_closing:

@@ -17,14 +17,14 @@ from mcz.show.viewing.file_registry import Shelf, Stored, put
 from mcz.show.viewing.player import player, viewer_page
 from mcz.show.viewing.server import Server
 
-_OPEN: set[View] = set()  # those that are served, whether anybody keeps them or not
+_OPEN: set[View] = set()  # served views, also those without a reference
 
 
 class View:
     """Result of ``view``: players in a notebook, or a server, whose page is at ``url``.
 
-    ``url`` is None in a notebook. ``close`` ends the server, as leaving the context does, and as
-    the end of the process does.
+    ``url`` is None in a notebook. ``close``, the end of the context, and the end of the process end
+    the server.
     """
 
     def __init__(self, server: Server | None, players: Sequence[str] = ()) -> None:
@@ -37,7 +37,7 @@ class View:
         return "<View in a notebook>" if self.url is None else f"<View at {self.url}>"
 
     def _repr_html_(self) -> str | None:
-        """The players; None where a page is served."""
+        """The players; None if a page is served."""
         return None if self.url is not None else "\n".join(self._players)
 
     def __enter__(self) -> View:
@@ -47,7 +47,7 @@ class View:
         self.close()
 
     def close(self) -> None:
-        """End the server, if it is not ended yet."""
+        """End the server, unless it has ended."""
         if self in _OPEN and self._server is not None:
             _OPEN.discard(self)
             self._server.close()
@@ -68,22 +68,22 @@ def view(
     browser: bool = True,
     port: int = 0,
 ) -> View:
-    """Show motions: each a Motion, a Clip, or a path or URL as ``mcz view`` takes it.
+    """Show motions: each a Motion, a Clip, or a path or URL as for ``mcz view``.
 
     In a notebook the result displays as a small player of each. Elsewhere a server on this machine
     shows them on a page, which is opened in the browser unless ``browser`` is False, until the
-    result is closed. ``skeleton``, ``rate``, ``unit``, ``up``, ``arrays`` and ``model`` say what
-    files do not, as to ``mcz.read``; ``salvage``: files may be damaged. Raises MczError for what
-    cannot be read, and AccessError where this installation has no page or the ``port`` cannot be
-    had.
+    result is closed. ``skeleton``, ``rate``, ``unit``, ``up``, ``arrays`` and ``model`` state facts
+    that files lack, as for ``mcz.read``; ``salvage``: files may be damaged. Raises MczError for
+    unreadable files, and AccessError if this installation has no page or the ``port`` is not
+    available.
     """
     if not things:
         raise OptionError("there is nothing to view: give a Motion, a Clip or a path")
     facts = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
-    said = {"skeleton": skeleton, **facts}
+    options = {"skeleton": skeleton, **facts}
     if in_notebook():
-        return View(None, [_player_of(thing, said, salvage) for thing in things])
-    shelf = Shelf(said, _tell, salvage=salvage)
+        return View(None, [_player_of(thing, options, salvage) for thing in things])
+    shelf = Shelf(options, _tell, salvage=salvage)
     try:
         for thing in things:
             _give(shelf, thing)
@@ -108,15 +108,15 @@ def _tell(line: str) -> None:
     sys.stderr.write(f"mcz: {line}\n")
 
 
-def _player_of(thing: Thing, said: JsonObject, salvage: bool) -> str:
-    """A player of a Motion or Clip, or of a file; of an ``.mcz`` that is one of its first clip."""
+def _player_of(thing: Thing, options: JsonObject, salvage: bool) -> str:
+    """A player of a Motion or Clip, or of a file; of an ``.mcz`` it shows the first clip."""
     from mcz.files.reading.file import open
     from mcz.files.reading.read import read
 
     if isinstance(thing, Motion | Clip):
         return player(thing)
     if not ("://" in str(thing) or str(thing).lower().endswith(".mcz")):
-        return player(read(thing, **said))
+        return player(read(thing, **options))
     with open(thing, salvage=salvage) as file:
         for clip in file:
             return player(clip)
@@ -139,7 +139,7 @@ def _write(motion: Motion, out: BinaryIO) -> None:
 
 
 def _copy(clip: Clip, out: BinaryIO) -> None:
-    """The clip as it is stored; decoded and coded without loss where its file has no path."""
+    """The clip as stored; decoded and encoded without loss if its file has no path."""
     from mcz.files.editing.extraction import extract
 
     target = clip.container.source.target
@@ -157,7 +157,7 @@ def _close_all() -> None:
 
 
 def show(url: str) -> bool:
-    """Open ``url`` in the browser; False where there is none, or only one within the terminal."""
+    """Open ``url`` in the browser; False without a browser outside of the terminal."""
     import webbrowser
 
     graphic = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")

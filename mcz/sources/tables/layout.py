@@ -199,7 +199,7 @@ def build_table(sections: Sequence[Section]) -> tuple[bytes, bytes]:
     return template, build(TableDetail(details=details), "source detail")
 
 
-def parse_table(template: bytes, detail: bytes, sizes: Sequence[int]) -> list[Section]:
+def parse_sections(template: bytes, detail: bytes, sizes: Sequence[int]) -> list[Section]:
     """The sections of a table of signals that have ``sizes`` channels; FormatError on bad bytes."""
     shared = parse(TableTemplate, template, "source template", {"runs": MAX_RUNS}).sections
     own = parse(TableDetail, detail, "source detail", {"runs": MAX_RUNS}).details

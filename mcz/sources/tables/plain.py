@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from mcz.errors import MotionError
-from mcz.model.clock import EXACT, TIMES, Timeline, numbers_or_rows
+from mcz.model.clock import TIMES, TOLERANCE, Timeline, numbers_or_rows
 from mcz.model.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources.tables.layout import Clock, Section, build_table
@@ -94,7 +94,7 @@ def _times(motion: Motion) -> tuple[Clock | None, tuple[Signal, ...]]:
     if timeline is None:
         raise MotionError("its frame rate is unknown; a table has times", clip=motion.name)
     times = timeline.times
-    noise = EXACT + float(np.spacing(np.abs(times).max(initial=0.0)))
+    noise = TOLERANCE + float(np.spacing(np.abs(times).max(initial=0.0)))
     exact = (np.abs(np.round(times, DECIMALS) - times) < noise).all()
     grid = Grid(GridKind.FIXED, DECIMALS if exact else MORE_DECIMALS)
     clock = _clock(motion, timeline, grid)
@@ -117,7 +117,7 @@ def _clock(motion: Motion, timeline: Timeline, grid: Grid) -> Clock | None:
     if most >= 2**52 or int(numbers.max()) * step.numerator >= 2**62:
         return None
     off = np.abs(grid.values(np.array(clock.ordinals(numbers.tolist()))) - timeline.times)
-    return clock if off.max() <= 0.5 * 10.0**-grid.digits + timeline.rounding + EXACT else None
+    return clock if off.max() <= 0.5 * 10.0**-grid.digits + timeline.rounding + TOLERANCE else None
 
 
 def _rate(motion: Motion) -> Fraction:

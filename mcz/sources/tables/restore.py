@@ -14,11 +14,10 @@ from mcz.errors import FormatError
 from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Exceptions, Motion, Signal
 from mcz.model.numbers import Grid, GridKind
+from mcz.model.types import Ints
 from mcz.sources.restore import printed_count, rows_text, text_limit
-from mcz.sources.tables.layout import Section, fill, parse_table
+from mcz.sources.tables.layout import Section, fill, parse_sections
 from mcz.sources.tables.source import TableNotes
-
-Ints = NDArray[np.int64]
 
 INTEGERS = Grid(GridKind.FIXED)
 
@@ -32,11 +31,13 @@ def restore_table(motion: Motion) -> bytes:
     source, signals = motion.source, motion.signals
     assert source is not None
     sizes = [signal.n_channels for signal in signals]
-    sections = parse_table(source.template, source.detail, sizes)
+    sections = parse_sections(source.template, source.detail, sizes)
     notes = source.notes if isinstance(source.notes, TableNotes) else TableNotes(())
     if len(notes.sections) > len(sections):  # TABLE-09
-        raise FormatError(f"source notes: of {len(notes.sections)} sections, not {len(sections)}")
-    tables = [_columns(motion, section) for section in sections]
+        raise FormatError(
+            f"source notes for {len(notes.sections)} sections, the template has {len(sections)}"
+        )
+    tables = [_section_table(motion, section) for section in sections]
     limit = text_limit(source, [table.values.shape for table, _ in tables])
     names = [joint.name for joint in motion.skeleton.joints]
     out: list[bytes | memoryview] = []
@@ -51,13 +52,13 @@ def restore_table(motion: Motion) -> bytes:
     return b"".join(out)
 
 
-def _columns(motion: Motion, section: Section) -> tuple[Signal, Ints]:
+def _section_table(motion: Motion, section: Section) -> tuple[Signal, Ints]:
     """The columns of a section, and the number of the frame of each row."""
     signals = [motion.signals[number] for number in section.signals]
     n_each = signals[0].samples_per_frame
     if any(signal.samples_per_frame != n_each for signal in signals):  # TABLE-06
         raise FormatError("source template: signals of a section differ in their rows a frame")
-    signal = beside(signals)
+    signal = join_signals(signals)
     frame, within = np.divmod(np.arange(signal.n_rows), n_each)
     numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)[frame]
     more, grids = [], []
@@ -74,8 +75,8 @@ def _columns(motion: Motion, section: Section) -> tuple[Signal, Ints]:
     return _with_columns(signal, more, grids), numbers
 
 
-def beside(signals: Sequence[Signal]) -> Signal:
-    """One signal that has the channels of all, one signal behind the other."""
+def join_signals(signals: Sequence[Signal]) -> Signal:
+    """One signal with the channels of all, in order."""
     if len(signals) == 1:
         return signals[0]
     starts = np.cumsum([0, *(signal.n_channels for signal in signals)])[:-1].tolist()
@@ -107,7 +108,7 @@ def _exceptions(placed: Sequence[tuple[int, Signal]]) -> Exceptions:
 def _with_columns(
     signal: Signal, more: Sequence[NDArray[np.float64]], grids: Sequence[Grid]
 ) -> Signal:
-    """``signal`` with more columns behind its own."""
+    """``signal`` with more columns after its own."""
     if not more:
         return signal
     mask = signal.mask

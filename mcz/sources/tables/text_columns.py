@@ -1,8 +1,8 @@
-"""Columns of a table whose cells are no numbers, kept as text: time codes, dates, labels, flags.
+"""Text columns of a table: time codes, dates, labels, flags.
 
-The letters and signs of a text are gaps of its row's pattern. Its digits are columns of integers,
-one for each digit, or for each number where none is printed with leading zeros: so
-a time code costs no more than numbers that count. docs/reference/readers.md, "Tables".
+The letters and signs of a text are literals of its row's pattern. Its digits are columns of
+integers, one column a digit, or one a number if no number has leading zeros. A time code then costs
+as little as a counter. docs/reference/readers.md, "Tables".
 """
 
 from __future__ import annotations
@@ -14,18 +14,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import SourceError
 from mcz.model.numbers import scan
 from mcz.model.numbers.tokens import kernels
+from mcz.model.types import Bools, Ints
 from mcz.sources.tables.csv_text import DECIMAL_COMMA, NO_NUMBER, check_points
 from mcz.sources.text.layout import MAX_PATTERNS, Pattern, runs_of
 from mcz.sources.text.notes import RowNotes
 from mcz.sources.text.rows import DENSE, FEW_CELLS, Rows, line_of, padding
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # A column of few texts is stored whole if they seldom change, or if many rows share each.
 FEW_TEXTS = 16
@@ -37,7 +34,7 @@ _PLAIN = re.compile(rb"0|[1-9][0-9]{0,14}")
 
 @dataclass(frozen=True, slots=True)
 class TextColumn:
-    """A column of text: its number in the table, and how many columns hold its numbers."""
+    """A column of text: its index, and how many number columns it becomes."""
 
     column: int
     n_numbers: int
@@ -47,8 +44,8 @@ class TextColumn:
 class OddCells:
     """The cells that hold no plain number: their rows, columns, texts.
 
-    ``is_missing``: which are a word for no number. ``n_cells``: of each column, blank ones left
-    out.
+    ``is_missing``: mask of the words that mean no number (nan). ``n_cells``: cells of each column
+    that are not blank.
     """
 
     rows: Ints
@@ -58,7 +55,7 @@ class OddCells:
     n_cells: Ints
 
     def missing(self, text_columns: Sequence[int]) -> tuple[bytes, int]:
-        """The word that stands most often for no number, and how often; b"" where there is none."""
+        """The commonest word for a missing number, and its count; b"" if there is none."""
         chosen = self.is_missing & ~np.isin(self.columns, text_columns)
         counts = Counter(self.texts[k] for k in np.flatnonzero(chosen).tolist())
         return counts.most_common(1)[0] if counts else (b"", 0)
@@ -106,7 +103,7 @@ def refuse_commas(data: bytes, odd: OddCells, start: Ints, text_columns: Sequenc
 class _Shape:
     """A text: literals around its numbers, and the column of each number.
 
-    ``padded``: a text that takes as many blanks where the column is padded, else b"".
+    ``padded``: sample text with the same padding, b"" where the column is not padded.
     """
 
     literals: tuple[bytes, ...]
@@ -117,9 +114,9 @@ class _Shape:
 def split_text(
     data: bytes, rows: Rows, columns: Mapping[int, int], at: int
 ) -> tuple[Rows, list[TextColumn]]:
-    """``rows`` without the text ``columns``; those of their numbers come in front of column ``at``.
+    """``rows`` without the text ``columns``, with number columns inserted before ``at``.
 
-    ``columns``: which cell of a line each is, from 1. Raises SourceError where the texts have too
+    ``columns``: the cell number of each, for messages. Raises SourceError where the texts have too
     many different letters and signs.
     """
     shapes: list[tuple[Ints, list[_Shape]]] = []  # of each column: the shape of each row, and all
@@ -155,7 +152,7 @@ def split_text(
         most = max(zip(columns, shapes, strict=True), key=lambda entry: len(entry[1][1]))[0]
         raise SourceError(
             f"the texts of column "
-            f"{columns[most]} differ in more than {MAX_PATTERNS} ways beside their digits",
+            f"{columns[most]} differ in more than {MAX_PATTERNS} ways apart from their digits",
             line=line_of(data, int(rows.start[:, most].max())),
         )
     of_row = of_row.ravel()
@@ -183,7 +180,7 @@ def split_text(
 def _merge_columns(
     pattern: Pattern, shapes: dict[int, _Shape], place: dict[int, int], first: int
 ) -> tuple[Pattern, bytes]:
-    """``pattern`` with texts in its gaps, and what it has put in front of its tail."""
+    """``pattern`` with texts in its gaps, and the prefix of its tail."""
     items, carry = [], b""
     for run in pattern.runs:
         for column in range(run.column, run.column + run.n_columns):

@@ -74,7 +74,9 @@ class _Placed:
 
     def __init__(self, motion: mcz.Motion, matrix: Floats) -> None:
         if motion.signals[0].channels is not None:
-            raise mcz.MotionError(f"{motion.name!r}: its channels are not those of its skeleton")
+            raise mcz.MotionError(
+                f"{motion.name!r}: the channels of its motion signal differ from its skeleton's"
+            )
         self.skeleton = motion.skeleton
         self.matrix, self.scale = matrix, float(np.cbrt(np.linalg.det(matrix)))
         self.turn = matrix / self.scale

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz.bench.cases import Case, load
-from mcz.bench.measure import Record, what_is_coded, write_file
+from mcz.bench.measure import Record, coded_part, write_file
 from mcz.errors import MotionError
 from mcz.exchange.conversion import from_positions
 from mcz.files.reading.sizes import clip_sizes
@@ -27,7 +27,7 @@ def way_back(case: Case, step_cm: float | None, virtual_markers: bool) -> Record
 
     Raises MotionError where the length unit or the angle unit is unknown.
     """
-    motion = what_is_coded(load(case).motion, CODEC)
+    motion = coded_part(load(case).motion, CODEC)
     unit = motion.skeleton.unit_cm
     if unit is None:
         raise MotionError(f"{case.name}: its length unit is unknown")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import mcz
 from mcz.bench.cases import Loaded, Variant, load
 from mcz.bench.ladder import dial_of
-from mcz.bench.measure import Record, cpu_seconds, work_of, write_file
+from mcz.bench.measure import Record, codec_calls, cpu_seconds, write_file
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_finder
 from mcz.codecs.online.units import Unit, parse_units
@@ -234,7 +234,7 @@ def speeds(clip: Clip, variants: Sequence[tuple[Variant, Params]]) -> list[Recor
     for variant, more in variants:
         params = variant.options(dict(more))
         codec = codec_by_name(variant.codec)
-        encode, decode = work_of(motion, variant.codec, params)
+        encode, decode = codec_calls(motion, variant.codec, params)
         seconds = {"encode": cpu_seconds(encode), "decode": cpu_seconds(decode)}
         row = {"label": variant.label, "settings": dict(more), "live": False}
         rows.append(row | _per_second(motion, seconds))

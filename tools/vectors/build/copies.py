@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mcz.container import payloads
-from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_header
+from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_chunk_header
 from mcz.container.copies import Copy
 from mcz.model.schema import deflate, varint
 from tools.records import build_record
@@ -16,7 +16,7 @@ def copies_of(crafter: Crafter, start: int = len(SIGNATURE)) -> list[Copy]:
     """Copies of those chunks that ``crafter`` wrote after ``start`` and that may be copied."""
     data, at, found = crafter.data, start, []
     while at < len(data):
-        chunk = parse_header(data[at : at + HEADER.size], at)
+        chunk = parse_chunk_header(data[at : at + HEADER.size], at)
         if chunk.type in COPIED:
             payload = data[chunk.payload_offset :][: chunk.length]
             found.append(Copy(at, chunk.type, payload))

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from mcz.container import payloads
-from mcz.container.segments import SegmentHeader, StreamCounts, parse_table
+from mcz.container.segments import SegmentHeader, StreamCounts, parse_stream_table
 from mcz.model.schema import varint
 from tools.records import span
 
@@ -92,7 +92,7 @@ def table(n_groups: int, **changes: bytes) -> Edit:
     """Edit the fields of a segment; its table_crc is made anew unless it is given."""
 
     def edit(payload: bytes) -> bytes:
-        found = parse_table(payload, StreamCounts(n_groups, 1))
+        found = parse_stream_table(payload, StreamCounts(n_groups, 1))
         header, n_streams = found.header, len(found.lengths)
         marked = sum(1 << i for i, length in enumerate(found.lengths) if length)
         parts = {

@@ -26,7 +26,7 @@ from mcz.container.chunks import (
     ChunkType,
     build_chunk,
     build_foot,
-    parse_header,
+    parse_chunk_header,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow
 from mcz.container.index import index_record
@@ -236,7 +236,7 @@ class Crafter(Writer):
         """Content of a REPT in a file of one clip."""
         data, at, repeated = self.data, len(SIGNATURE), b""
         while at < len(data):
-            chunk = parse_header(data[at : at + HEADER.size], at)
+            chunk = parse_chunk_header(data[at : at + HEADER.size], at)
             repeated += data[at : at + chunk.size] if chunk.type in REPEATED else b""
             at += chunk.size
         return repeated

@@ -19,7 +19,7 @@ from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Signal
 from mcz.codecs.posewave import posewave
 from mcz.codecs.posewave.contacts import ContactTracker, Piece
 from mcz.codecs.posewave.exact_channels import build_exact, groups_of
-from mcz.codecs.posewave.header import Header, PosewaveHeader, parse_header
+from mcz.codecs.posewave.header import Header, PosewaveHeader, parse_posewave_header
 from mcz.codecs.posewave.segment import SegmentChain, Weights, encode_segment
 from mcz.model.motion import Joint, Skeleton
 from mcz.model.numbers import Grid
@@ -112,7 +112,7 @@ def layout_of(plan: Plan) -> Layout:
 
 
 def parse_plan(plan: Plan) -> Header:
-    return parse_header(header_of(plan), layout_of(plan))
+    return parse_posewave_header(header_of(plan), layout_of(plan))
 
 
 def segments_of(plan: Plan) -> list[Segment]:

@@ -21,7 +21,7 @@ from mcz.container.chunks import (
     SIGNATURE,
     Chunk,
     build_foot,
-    parse_header,
+    parse_chunk_header,
 )
 from mcz.container.directory import ClipRow, Directory, SegmentRow, signal_rows
 from mcz.container.index import Listing, end_of, segment_rows
@@ -38,8 +38,7 @@ from mcz.container.packets import (
     packet_check,
 )
 from mcz.container.parser_drivers import packets
-from mcz.container.segments import SegmentHeader, build_segment, mask_of
-from mcz.container.segments import parse_header as parse_segment
+from mcz.container.segments import SegmentHeader, build_segment, mask_of, parse_segment_header
 from mcz.container.source import open_source
 from mcz.errors import FormatError, MczError, TruncatedError
 from mcz.model.schema import EXTENDED, build, deflate, parse, read_varint
@@ -62,7 +61,7 @@ class Segment:
     @classmethod
     def of(cls, payload: bytes) -> Segment:
         """The parts of ``payload``; streams at the end may be missing that are empty."""
-        header, start = parse_segment(payload)
+        header, start = parse_segment_header(payload)
         for size in (*range(1, len(payload)), 0):  # most have streams
             with suppress(TruncatedError):
                 lengths, extension, at = cls._table(payload, start, size, header.flags)
@@ -172,7 +171,7 @@ def parts_of(data: bytes) -> Iterator[Part]:
             yield Part(b"FOOT", data[at : at + FOOT.size], place=at)
             at += FOOT.size
             continue
-        chunk = parse_header(data[at : at + HEADER.size], at)
+        chunk = parse_chunk_header(data[at : at + HEADER.size], at)
         if chunk.length is None:
             yield Part(chunk.type, b"", chunk.flags, place=at + HEADER.size, open=True)
             at += HEADER.size
@@ -236,7 +235,7 @@ class Layout:
                 due += 1
             elif packet.kind == SEGMENT:
                 with suppress(MczError):
-                    header, _ = parse_segment(part.payload)
+                    header, _ = parse_segment_header(part.payload)
                     if header.signal == 0:
                         due, mask = header.stop, part.payload
 
@@ -318,7 +317,7 @@ class Layout:
             header = row.header if row else SegmentHeader(0, 0, 1)
             if has_segment(part):
                 with suppress(FormatError):
-                    header = parse_segment(part.payload)[0]
+                    header = parse_segment_header(part.payload)[0]
             yield SegmentRow(part.offset, len(part.payload), header, packet)
 
 

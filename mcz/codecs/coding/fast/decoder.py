@@ -22,8 +22,8 @@ from mcz.model.types import Ints
 Fetch = Callable[[int], bytes]  # a group -> its stream
 
 MOST_ROWS, MOST_VALUES = 4096, 2**23  # of a segment
-MOST_KNOWN = 64  # requests of which a shape keeps the columns
-SPARE = 16  # bytes behind the streams that a window may reach
+MOST_KNOWN = 64  # requests whose columns are kept
+SPARE = 16  # bytes after the streams within reach of a window
 FAULTS = (
     "it ends in the head",
     "its kind is unknown",
@@ -52,7 +52,7 @@ def kernels() -> tuple[ModuleType, ...]:
 
 
 class Shape:
-    """A signal as its decoder knows it: grids of its channels in CLIP, their forms, its groups."""
+    """A signal for its decoder: grids of its channels in CLIP, their forms, its groups."""
 
     def __init__(self, grids: Sequence[Grid], groups: Sequence[Sequence[int]]) -> None:
         self.grids, self.groups = grids, groups
@@ -62,28 +62,28 @@ class Shape:
 
     def columns(self, groups: tuple[int, ...]) -> Columns:
         """The channels of groups, one group after the other; raises FormatError."""
-        found = self._known.get(groups)
-        if found is None:
+        result = self._known.get(groups)
+        if result is None:
             if (most := max(groups, default=0)) >= max(1, len(self.groups)):  # FAST-27, FAST-34
                 raise FormatError(f"fast: group {most} of {len(self.groups)}")
             channels = np.array([c for group in groups for c in self.groups[group]], np.int64)
             firsts = np.cumsum([0, *(len(self.groups[group]) for group in groups)])
             places = np.full(len(self.groups), -1)
             places[list(groups)] = np.arange(len(groups))
-            found = Columns(
+            result = Columns(
                 channels, self.forms[channels], firsts, np.array(groups, np.int64), places
             )
             if len(self._known) < MOST_KNOWN:
-                self._known[groups] = found
-        return found
+                self._known[groups] = result
+        return result
 
 
 @dataclass(frozen=True, slots=True)
 class Columns:
     """The channels of some groups: numbers in the signal, and forms.
 
-    ``firsts``: the first channel of each group, and the number of all; ``places``: where each
-    group of the signal is among ``groups``, or -1.
+    ``firsts``: the first channel of each group, and the number of all; ``places``: the place of
+    each group of the signal in ``groups``, or -1.
     """
 
     channels: Ints
@@ -97,8 +97,8 @@ class Columns:
 class Heads:
     """The heads of some groups of a segment, one after the other.
 
-    ``plans``: a row a channel, as head_kernels has it; ``parts``: where residuals, tails and what
-    follows them begin.
+    ``plans``: a row a channel, as in head_kernels; ``parts``: begins of residuals, tails and the
+    rest.
     """
 
     groups: tuple[int, ...]
@@ -126,7 +126,7 @@ def check_size(n_rows: int, n_channels: int, n_frames: int) -> None:
 
 
 def read_heads(shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int) -> Heads:
-    """The heads of groups; raises FormatError for what is none."""
+    """The heads of groups; raises FormatError for bad heads."""
     own = kernels()[0]
     columns = shape.columns(groups)
     streams = [fetch(group) for group in groups]
@@ -135,29 +135,29 @@ def read_heads(shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int)
     plans = np.zeros((len(columns.channels), own.PLAN_SIZE), np.int64)
     parts = np.zeros((len(groups), 3), np.int64)
     parts[:, 2] = bounds[1:]
-    found = Heads(groups, columns, data, plans, parts)
+    heads = Heads(groups, columns, data, plans, parts)
     text = np.frombuffer(data, np.uint8)
     channel, fault = own.read_heads(
         text, bounds, columns.firsts, n_rows, columns.forms, plans, parts
     )
     if channel >= 0:
-        raise found.fault(channel, fault)
-    return found
+        raise heads.fault(channel, fault)
+    return heads
 
 
 def read_heads_of(
-    shape: Shape, wanted: tuple[int, ...], fetch: Fetch, n_rows: int
+    shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int
 ) -> tuple[Heads, int]:
-    """The heads of groups, then of those that copies name, then of those that have parents.
+    """The heads of groups, then of sources of copies, then of groups with parents.
 
     Also the number of groups before the last.
     """
     own = kernels()[0]
-    heads = read_heads(shape, wanted, fetch, n_rows)
-    if len(wanted) == len(shape.groups):
-        return heads, len(wanted)
+    heads = read_heads(shape, groups, fetch, n_rows)
+    if len(groups) == len(shape.groups):
+        return heads, len(groups)
     if absent := heads.absent(own.COPY):
-        heads = read_heads(shape, (*wanted, *absent), fetch, n_rows)
+        heads = read_heads(shape, (*groups, *absent), fetch, n_rows)
     n_whole = len(heads.groups)
     if absent := heads.absent(own.CODED):
         heads = read_heads(shape, (*heads.groups, *absent), fetch, n_rows)
@@ -165,15 +165,15 @@ def read_heads_of(
 
 
 class SegmentDecoder:
-    """Decodes some groups of a segment: heads first, then lanes, then what follows from these."""
+    """Decodes some groups of a segment: heads, then lanes, then dependent columns."""
 
-    def __init__(self, shape: Shape, wanted: tuple[int, ...], fetch: Fetch, out: Ints) -> None:
-        """``out``: (rows, channels of the groups ``wanted``). Raises FormatError."""
+    def __init__(self, shape: Shape, groups: tuple[int, ...], fetch: Fetch, out: Ints) -> None:
+        """``out``: (rows, channels of ``groups``). Raises FormatError."""
         lane = kernels()[1]
-        heads, n_whole = read_heads_of(shape, wanted, fetch, len(out))
+        heads, n_whole = read_heads_of(shape, groups, fetch, len(out))
         columns = heads.columns
         channel, fault = lane.link(
-            heads.plans, columns.firsts, columns.groups, columns.places, len(wanted), n_whole
+            heads.plans, columns.firsts, columns.groups, columns.places, len(groups), n_whole
         )
         if channel >= 0:
             raise heads.fault(channel, fault)
@@ -192,7 +192,6 @@ class SegmentDecoder:
             self.out[:] = self.rows[:, :n_wanted]
 
     def _map_units(self) -> None:
-        """Turn the leads of lanes with units into ordinals."""
         own, _, residual, _ = kernels()
         plans = self.heads.plans
         n_whole = len(self.lanes.tails)

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from mcz.codecs.coding.fast.survey_kernels import Channels, CodedLanes
 
 
-FEWEST_ROWS = 32  # for which parents are looked for
+FEWEST_ROWS = 32  # for a search of parents
 VALUE_BYTES = 20  # of a residual and a tail, of a run or of an exception, at most
-HEAD_BYTES = 128  # beside runs and exceptions, at most, and of the size of residuals
-SPARE = 16  # bytes behind the last that are written to
+HEAD_BYTES = 128  # besides runs and exceptions, at most, and of the size of residuals
+SPARE = 16  # bytes after the last that are written to
 ANY = 2**62  # above all magnitudes
 
 
@@ -50,7 +50,7 @@ def kernels() -> tuple[ModuleType, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A segment as it is written: its channels, those that are coded, the fields of all units."""
+    """A segment to write: its channels, the coded ones, the fields of all units."""
 
     channels: Channels
     lanes: CodedLanes
@@ -58,7 +58,7 @@ class Plan:
 
     @property
     def most_bytes(self) -> int:
-        """The bytes that no stream, and no part of one, has more of."""
+        """An upper bound of the bytes of a stream, and of its parts."""
         sizes = self.channels.ordinals.size * VALUE_BYTES, len(self.channels.plans) * HEAD_BYTES
         return sum(sizes) + SPARE
 
@@ -77,7 +77,6 @@ class StreamBuilder:
         self._set_grids(tuple(clip_grids))
 
     def _set_grids(self, signal_grids: tuple[Grid, ...]) -> None:
-        """Note the grids in force, of each channel of the signal."""
         self._signal_grids = signal_grids
         self.grids = tuple(signal_grids[number] for number in self.numbers.tolist())
         self.forms = _forms(self.grids)
@@ -109,7 +108,7 @@ class StreamBuilder:
         return Plan(channels, lanes, np.frombuffer(fields, np.uint8))
 
     def write(self, plan: Plan) -> tuple[bytes, ...]:
-        """The streams of a plan, whose heads have parents then."""
+        """The streams of a plan with parents."""
         *_, parent, write = kernels()
         if len(plan.lanes.numbers) > 1 and len(plan.channels.ordinals) >= FEWEST_ROWS:
             parent.choose_parents(plan.lanes, plan.channels.plans)
@@ -121,7 +120,6 @@ class StreamBuilder:
         return tuple(rooms[0, a:b].tobytes() for a, b in zip(starts, stops, strict=False))
 
     def _channels(self, ordinals: Ints) -> Channels:
-        """Room for what is noted of the channels of a segment."""
         survey = kernels()[2]
         columns = np.empty((len(self.numbers), len(ordinals)), np.int64)
         plans = np.zeros((len(self.numbers), survey.PLAN_SIZE), np.int64)
@@ -132,7 +130,7 @@ class StreamBuilder:
         return result
 
     def _find_units(self, channels: Channels) -> tuple[dict[int, Ints], bytes]:
-        """Code channels in units where they can be; their rests, and the fields of all units."""
+        """Code channels in units where possible; returns rests, and the fields of all units."""
         head, _, survey, plan, _, _ = kernels()
         plans = channels.plans
         tried = self._find_candidates(channels)
@@ -162,14 +160,14 @@ class StreamBuilder:
         head, _, survey, _, _, _ = kernels()
         is_coded = channels.plans[:, head.KIND] == head.CODED
         is_small = channels.plans[:, survey.MOST] < self.unit_limits
-        found: Bools = is_coded & is_small
+        candidates: Bools = is_coded & is_small
         others = np.flatnonzero(is_coded & ~is_small & self.may_be_counts)
         grids = [self.grids[n] for n in others.tolist()]
-        found[others] = may_be_counts(channels.ordinals, self.numbers[others], grids)
-        return found
+        candidates[others] = may_be_counts(channels.ordinals, self.numbers[others], grids)
+        return candidates
 
     def _find_leads(self, channels: Channels) -> CodedLanes:
-        """The coded channels, split into leads and tails; these take the place of their columns."""
+        """The coded channels, split into leads and tails, which replace their columns."""
         head, tail, survey, _, _, write = kernels()
         plans = channels.plans
         numbers = np.flatnonzero(plans[:, head.KIND] == head.CODED)

@@ -1,7 +1,7 @@
-"""The coded channels of segments, decoded by kernels or, where none are compiled, by numpy.
+"""The coded channels of segments, decoded by kernels or, if none are compiled, by numpy.
 
-SPEC.md, "Codec 1: fast", is normative. With numpy the streams of several segments go row by row
-together, so that each operation works on all of them.
+SPEC.md, "Codec 1: fast", is normative. With numpy the streams of several segments are decoded row
+by row together, so that each operation works on all of them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ ZEROS = np.array([8, *((n & -n).bit_length() - 1 for n in range(1, 256))])  # be
 MASKS = np.array([(1 << n) - 1 for n in range(64)], np.uint64)
 POWERS = np.array(tail.POWERS)
 FEWEST_BITS, FIRST_LONG, LONGER = map(np.array, (tail.FEWEST_BITS, tail.FIRST_LONG, tail.LONGER))
-NEVER = 1 << 62  # a least long tail, where there are none
+NEVER = 1 << 62  # a least long tail, if there are none
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +38,11 @@ class Lanes:
     """The coded channels of a segment, ready to be decoded.
 
     ``starts``: the first lane of each group whose residuals are read, and the number of all;
-    ``columns``: the channels of lanes. The tails are those of groups that are read whole.
+    ``columns``: the channels of lanes. Tails are of groups that are read whole.
     """
 
     data: NDArray[np.uint8]
-    residuals: Ints  # (groups, 2): the first bit, and the one behind the last
+    residuals: Ints  # (groups, 2): the first bit, and the one after the last
     tails: Ints
     starts: Ints
     columns: Ints
@@ -87,7 +87,7 @@ class Streams:
     """Bits of many streams, those of most lanes first.
 
     ``data`` has the eight bytes from each offset on; ``rows``: those of their segments; ``lanes``:
-    those that come first, second and so on in their streams, of all segments.
+    the first, the second and so on of their streams, of all segments.
     """
 
     data: Words
@@ -122,8 +122,8 @@ class Streams:
         return Streams(self.data, self.bits[own], self.ends[own], self.rows[own], [])
 
 
-def _streams(batch: Sequence[Lanes], parts: Callable[[Lanes], Ints], wanted: Bools) -> Streams:
-    """The streams of a part of all groups, and which of the lanes that are ``wanted`` they have."""
+def _streams(batch: Sequence[Lanes], parts: Callable[[Lanes], Ints], mask: Bools) -> Streams:
+    """The streams of a part of all groups, and their lanes in ``mask``."""
     bits, ends, rows, own = [], [], [], []
     at = first = 0
     for lanes in batch:
@@ -132,7 +132,7 @@ def _streams(batch: Sequence[Lanes], parts: Callable[[Lanes], Ints], wanted: Boo
             bits.append(8 * at + bit)
             ends.append(8 * at + end)
             rows.append(len(lanes.out))
-            own.append(lane[wanted[lane]])
+            own.append(lane[mask[lane]])
         at += len(lanes.data)
         first += len(lanes.columns)
     order = sorted(range(len(own)), key=lambda n: -len(own[n]))
@@ -166,7 +166,8 @@ def _read_leads(batch: Sequence[Lanes]) -> None:
     leads[: residual.BEHIND + 1] = _concatenate(batch, lambda lanes: lanes.predictors.first)
     residuals = np.zeros(len(scales), np.int64)
     for row in range(residual.BEHIND + 1, len(leads)):
-        if row - residual.BEHIND in lengths:  # what lanes of these segments have now is not used
+        # present values of lanes of these segments are not used
+        if row - residual.BEHIND in lengths:
             streams.ended(row - residual.BEHIND).check("residuals")
             streams = streams.longer(row - residual.BEHIND)
         for lanes in streams.lanes:
@@ -204,7 +205,7 @@ def _shift_words(words: Words, n: Ints) -> Words:
 
 
 def _read_long(streams: Streams, at: int, word: int, k: int) -> tuple[int, int]:
-    """The number that a code of more zeros stands for, and the bits of the code."""
+    """The number of a code with more zeros, and the bits of the code."""
     zeros = (word & -word).bit_length() - 1 if word else 64
     more = k + zeros - residual.PLAIN
     if more > residual.MOST_BITS:  # FAST-40
@@ -218,7 +219,7 @@ def _read_long(streams: Streams, at: int, word: int, k: int) -> tuple[int, int]:
 
 
 def _read_tails(batch: Sequence[Lanes]) -> None:
-    """Fill the columns of lanes; groups whose tails are more than digits go as kernels do."""
+    """Fill the columns of lanes; groups with other tails than digits are decoded as by kernels."""
     for lanes in batch:
         for lane in range(len(lanes.lattices)):
             tail.settle(lanes.lattices, lane)
@@ -254,7 +255,7 @@ def _read_as_kernel(lanes: Lanes, group: int) -> None:
 
 
 def _read_digits(batch: Sequence[Lanes], lattices: Ints, usual: Bools) -> Ints:
-    """The ordinals of lanes whose tails are digits of one base alone, ``usual``: (rows, lanes)."""
+    """The ordinals of lanes whose tails are digits of one base, ``usual``: (rows, lanes)."""
     leads = np.zeros((max(len(lanes.out) for lanes in batch), len(lattices)), np.int64)
     wanted = np.zeros(leads.shape, np.bool_)
     first = 0
@@ -288,7 +289,7 @@ def _read_digits(batch: Sequence[Lanes], lattices: Ints, usual: Bools) -> Ints:
 
 def _read_bits(streams: Streams, bits: Ints, long: Ints, longer: Ints) -> Ints:
     """Numbers of so many bits, one more from ``long`` on, which adds ``longer``; (rows, lanes)."""
-    found = np.zeros_like(bits)
+    numbers = np.zeros_like(bits)
     steps = [
         (lanes, bits[:, lanes], MASKS[bits[:, lanes]], long[:, lanes].astype(np.uint64))
         for lanes in streams.lanes
@@ -299,9 +300,9 @@ def _read_bits(streams: Streams, bits: Ints, long: Ints, longer: Ints) -> Ints:
             values = words & masks[row]
             is_long = values >= least[row]
             more = (_shift_words(words, own_bits[row]) & ONE).astype(np.int64) * is_long
-            found[row, lanes] = values.astype(np.int64) + more * longer[row, lanes]
+            numbers[row, lanes] = values.astype(np.int64) + more * longer[row, lanes]
             streams.bits[: len(lanes)] += own_bits[row] + is_long
     if (streams.bits > streams.ends).any():
         raise fault_of("tails", "row", len(bits))
     streams.check("tails")
-    return found
+    return numbers

@@ -77,11 +77,11 @@ def take_column(channels: Channels, n: int) -> int:
 
 def hashed(column: Ints) -> int:
     """A number that tells apart most columns that are not the same."""
-    found = 0
+    hash_value = 0
     for place in range(SEEN_ROWS):
         ordinal = column[place * len(column) // SEEN_ROWS]
-        found = (found * 1000003 ^ ordinal ^ ordinal >> 32) & (1 << HASH_BITS) - 1
-    return found
+        hash_value = (hash_value * 1000003 ^ ordinal ^ ordinal >> 32) & (1 << HASH_BITS) - 1
+    return hash_value
 
 
 def same(one: Ints, other: Ints) -> bool:

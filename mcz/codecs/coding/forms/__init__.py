@@ -1,4 +1,4 @@
-"""The forms of channels: what of their ordinals is coded as integers, and back; their ids.
+"""The forms of channels: ordinals as coded integers, and back; their ids.
 
 SPEC.md, "Codec 1: fast", is normative.
 """
@@ -16,7 +16,7 @@ BINARY_24, BINARY_53 = 88, 117  # classes of so many binary digits
 
 
 def form_of_grid(grid: Grid) -> int:
-    """The form of a channel whose head does not say it."""
+    """The form of a channel whose head does not state it."""
     if grid.kind == GridKind.PRINTED:
         return form_of_grid(printed_base(grid))
     if grid.kind == GridKind.GENERAL:
@@ -29,12 +29,12 @@ def form_of_grid(grid: Grid) -> int:
 
 
 def unit_grid(clip_grid: Grid) -> Grid:
-    """The grid whose ordinals forms 32 and 34 give, by that of the channel in CLIP."""
+    """The grid of ordinals from forms 32 and 34, by the channel's grid in CLIP."""
     return clip_grid if clip_grid.kind == GridKind.GENERAL else BINARY32
 
 
 def has_binary32(grid: Grid) -> bool:
-    """Tell grids whose ordinals are those of BINARY32; those of VAX_F are, of a quarter of it."""
+    """Return whether ordinals equal those of BINARY32; those of VAX_F do, for a quarter of it."""
     return grid.kind in (GridKind.BINARY32, GridKind.VAX_F) or (
         grid.kind == GridKind.PRINTED and printed_base(grid).kind == GridKind.TEXT32
     )

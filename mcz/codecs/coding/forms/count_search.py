@@ -11,35 +11,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcz.codecs.coding.forms import BINARY32
-from mcz.codecs.coding.forms.counts import MOST, Law, bounds, spacing
+from mcz.codecs.coding.forms.counts import MOST_OFFSET, Law, bounds, spacing
 from mcz.model.numbers import Grid, GridKind, values_of
 from mcz.model.types import Floats, Ints
 
-Line = tuple[float, float]  # what a count is, and what 0 is
+Line = tuple[float, float]  # unit of a count, and value of 0
 
 LEAST_UNIT, MOST_COUNT = 2.0**-200, 2.0**40
 FEWEST = 9  # distinct values that show a law
-VANISHING = -(2.0**-200)  # an offset that makes -0 of the count 0, and changes nothing else
-MOST_REST = 2**31 - 1  # that has a code: where a law misses 0, a rest may be as large as an ordinal
-COARSE = 8  # multiples of a unit that all lie so far apart may be counts of a greater one
-_QUANTILES = np.array([0, 0.05, 0.1, 0.2, 0.35, 0.5])  # of gaps: one may be the unit
-_SOME = 128  # gaps that are looked at first
-_NEAR = 8  # units that a gap may have to tell something
-_REACHES = 8 * 4.0 ** np.arange(24)  # units on both sides of the middle, one after the other
-_PARTS = 1, 2, 3  # of the least of few gaps
-_OFF = 0.15  # of a unit, on average: beyond, there is no law
-_SHARP = 0.02  # of a unit, the median: then the greatest unit is the one
-_TRIMS, _FAR = 3, 4.0  # rounds that leave out what is off by so many times the median
-_ROUNDS = 25  # to bring the greatest distance from a line down
+VANISHING = -(2.0**-200)  # an offset that makes -0 of the count 0, and changes no other value
+MOST_REST = 2**31 - 1  # largest coded rest: if a law misses 0, a rest may be as large as an ordinal
+COARSE = 8  # multiples of a unit at least so far apart may be counts of a greater unit
+_QUANTILES = np.array([0, 0.05, 0.1, 0.2, 0.35, 0.5])  # of differences: one may be the unit
+_SOME = 128  # differences of a first sample
+_NEAR = 8  # units of a difference that can confirm a unit
+_REACHES = 8 * 4.0 ** np.arange(24)  # units on both sides of the middle, in steps
+_PARTS = 1, 2, 3  # of the least of few differences
+_OFF = 0.15  # of a unit, on average: more means no law
+_SHARP = 0.02  # of a unit, the median: less decides for the greatest unit
+_TRIMS, _FAR = 3, 4.0  # rounds that leave out values off by so many times the median
+_ROUNDS = 25  # to lower the greatest distance from a line
 _HALVINGS = 40  # of an interval that the unit is in
 _HOPELESS = 4.0  # times the slack, at first
-_BIT_OF_A_REST = 1.3  # what the entropy coder takes for one
+_BIT_OF_A_REST = 1.3  # bits that the entropy coder needs for one
 _MARGIN = 64  # bits that a law must save
 
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """A law, the counts of a column, and what its ordinals are off."""
+    """A law, the counts of a column, and the errors of its ordinals."""
 
     law: Law
     counts: Ints
@@ -56,8 +56,7 @@ def find_counts(
 ) -> Counted | None:
     """The law that saves bits for a column of a grid, its counts and rests, or None.
 
-    ``grid``: BINARY32 or GENERAL. ``multiples``: a unit of which all are multiples, and these,
-    where there is one.
+    ``grid``: BINARY32 or GENERAL. ``multiples``: a common unit and the multiples of it, if known.
     """
     if multiples is not None and not _lie_apart(multiples[1]):
         return None
@@ -67,7 +66,7 @@ def find_counts(
     numbers = np.ravel(values_of(different[:, None], (grid,)))
     if not np.isfinite(numbers).all():
         return None
-    if grid.kind == GridKind.GENERAL and np.abs(numbers[[0, -1]]).max() > MOST:
+    if grid.kind == GridKind.GENERAL and np.abs(numbers[[0, -1]]).max() > MOST_OFFSET:
         return None
     distinct = np.unique(numbers)
     line = find_line(distinct, grid)
@@ -86,30 +85,30 @@ def _lie_apart(multiples: Ints) -> bool:
     return len(gaps) >= FEWEST - 1 and bool(gaps.min() >= COARSE)
 
 
-def _saves(found: Counted, values: Floats, fine: Floats | float) -> bool:
+def _saves(counted: Counted, values: Floats, fine: Floats | float) -> bool:
     """Return True if steps of a unit in place of ``fine`` ones save more than they cost."""
     changed = np.diff(values, prepend=0) != 0
-    saved = np.log2(np.maximum(found.law.unit / fine, 1)) * changed
-    return bool(saved.sum() > found.cost() + _MARGIN)
+    saved = np.log2(np.maximum(counted.law.unit / fine, 1)) * changed
+    return bool(saved.sum() > counted.cost() + _MARGIN)
 
 
 def _cheapest(laws: Iterable[tuple[Law, Ints]], ordinals: Ints, grid: Grid) -> Counted | None:
-    """The law that costs least, or the first without rests; None where no rests have codes."""
+    """The cheapest law, or the first without rests; None if no rests have codes."""
     best, least = None, np.inf
     for law, counts in laws:
-        found = Counted(law, counts, ordinals - law.ordinals(counts, grid))
-        if np.abs(found.rests).max() > MOST_REST:
+        counted = Counted(law, counts, ordinals - law.ordinals(counts, grid))
+        if np.abs(counted.rests).max() > MOST_REST:
             continue
-        cost = found.cost()
+        cost = counted.cost()
         if cost < least:
-            best, least = found, cost
-        if not found.rests.any():
+            best, least = counted, cost
+        if not counted.rests.any():
             break
     return best
 
 
 def find_line(distinct: Floats, grid: Grid) -> Line | None:
-    """The line that sorted numbers lie on, nearly, as whole numbers of a unit, or None."""
+    """The line near sorted numbers as whole numbers of a unit, or None."""
     gaps = np.diff(distinct)
     if len(distinct) < FEWEST:
         return _line_of_few(distinct, gaps) if grid.kind == GridKind.GENERAL else None
@@ -117,12 +116,12 @@ def find_line(distinct: Floats, grid: Grid) -> Line | None:
     if len(gaps) < FEWEST - 1:
         return None
     lines = (_grown(distinct, unit) for unit in _guesses(gaps))
-    found = [line for line in lines if line is not None]
-    sharp = [line for line in found if np.median(_distances(distinct, line)) < _SHARP]
+    candidates = [line for line in lines if line is not None]
+    sharp = [line for line in candidates if np.median(_distances(distinct, line)) < _SHARP]
     return (
         max(sharp)
         if sharp
-        else min(found, key=lambda line: _mean_distance(distinct, line), default=None)
+        else min(candidates, key=lambda line: _mean_distance(distinct, line), default=None)
     )
 
 
@@ -138,7 +137,7 @@ def _line_of_few(distinct: Floats, gaps: Floats) -> Line | None:
 
 
 def _guesses(gaps: Floats) -> list[float]:
-    """Gaps that most of the others are near multiples of: the cheap test."""
+    """Differences that most of the others are near multiples of: the cheap test."""
     ordered = np.sort(gaps)
     guesses = np.unique(ordered[(_QUANTILES * (len(gaps) - 1)).astype(np.int64)])
     ratios = gaps[:: max(1, len(gaps) // _SOME)] / guesses[:, None]
@@ -153,7 +152,6 @@ def _mean_distance(values: Floats, line: Line) -> float:
 
 
 def _distances(values: Floats, line: Line) -> Floats:
-    """Distances of values from whole multiples of a line's unit."""
     counts = (values - line[1]) / line[0]
     return np.abs(counts - np.rint(counts))
 
@@ -194,7 +192,7 @@ def _fit(counts: Floats, values: Floats, weights: Floats | None = None) -> Line 
 
 
 def _closest(counts: Floats, values: Floats, slack: Floats) -> Line | None:
-    """A line that is nowhere further from values than ``slack``, or nearly so (Lawson)."""
+    """A line that is within ``slack`` of all values, or nearly so (Lawson)."""
     weights, least, best = 1 / slack, _HOPELESS, None
     for _ in range(_ROUNDS):
         line = _fit(counts, values, weights / slack)
@@ -210,12 +208,12 @@ def _closest(counts: Floats, values: Floats, slack: Floats) -> Line | None:
     return best
 
 
-def _within(distinct: Floats, few: Floats, grid: Grid, line: Line) -> Line:
-    """A line that rounds to all values at counts, or nearly so where there is none.
+def _rounding_line(distinct: Floats, few: Floats, grid: Grid, line: Line) -> Line:
+    """A line that rounds to all values at counts, or nearly so if there is none.
 
-    How far apart the offsets of a unit may lie is concave in the unit.
+    The range of possible offsets of a unit is concave in the unit.
     """
-    some = distinct != 0  # no sum but by chance
+    some = distinct != 0  # equal sums only by chance
     sizes, (low, high) = distinct[some], bounds(np.abs(distinct[some]), grid)
     low, high = np.where(sizes < 0, (-high, -low), (low, high))
     middle = float(np.rint(few.mean()))
@@ -238,7 +236,6 @@ def _within(distinct: Floats, few: Floats, grid: Grid, line: Line) -> Line:
 
 
 def _laws(values: Floats, distinct: Floats, grid: Grid, line: Line) -> Iterator[tuple[Law, Ints]]:
-    """Laws to try, with the counts of all values."""
     zeros = values == 0
     zero_offset = VANISHING if 2 * np.signbit(values[zeros]).sum() > zeros.sum() else None
     distinct, few, line = _trim_law(distinct, grid, line)
@@ -249,7 +246,7 @@ def _laws(values: Floats, distinct: Floats, grid: Grid, line: Line) -> Iterator[
         for alone in _units_alone(distinct, few + moved, grid):
             yield Law(alone, zero_offset), counts + moved
     if grid.kind == GridKind.GENERAL:
-        for fitted in (_within(distinct, few, grid, line), line):
+        for fitted in (_rounding_line(distinct, few, grid, line), line):
             if _usable(*fitted):
                 yield Law(*fitted), counts
         return
@@ -267,7 +264,7 @@ def _laws(values: Floats, distinct: Floats, grid: Grid, line: Line) -> Iterator[
 
 
 def _trim_law(distinct: Floats, grid: Grid, line: Line) -> tuple[Floats, Floats, Line]:
-    """The values that are not far off, their counts, and the line through them."""
+    """The values near the line, their counts, and the line through them."""
     few = np.rint((distinct - line[1]) / line[0])
     kept, kept_few = distinct, few
     for _ in range(_TRIMS):
@@ -282,11 +279,10 @@ def _trim_law(distinct: Floats, grid: Grid, line: Line) -> tuple[Floats, Floats,
 
 
 def _usable(unit: float, *terms: float) -> bool:
-    return LEAST_UNIT <= unit <= MOST and all(abs(term) <= MOST for term in terms)
+    return LEAST_UNIT <= unit <= MOST_OFFSET and all(abs(term) <= MOST_OFFSET for term in terms)
 
 
 def _zero_of(line: Line) -> int | None:
-    """The count that 0 nearly has on a line, if it is near one."""
     unit, offset = line
     zero = np.rint(offset / unit)
     if abs(offset / unit - zero) > _OFF or abs(zero) > MOST_COUNT:
@@ -300,8 +296,11 @@ def _units_alone(distinct: Floats, few: Floats, grid: Grid) -> Iterator[float]:
         some = few != 0
         low, high = bounds(np.abs(distinct[some]), grid)
         sizes = np.abs(few[some])
-        least, most = float((low / sizes).max(initial=0)), float((high / sizes).min(initial=MOST))
-        if LEAST_UNIT <= least <= most <= MOST:
+        least, most = (
+            float((low / sizes).max(initial=0)),
+            float((high / sizes).min(initial=MOST_OFFSET)),
+        )
+        if LEAST_UNIT <= least <= most <= MOST_OFFSET:
             yield (least + most) / 2
             return
     for weights in (few, few / spacing(distinct, grid) ** 2):  # errors of one size; of last places
@@ -324,6 +323,6 @@ def _rounded_law(distinct: Floats, few: Floats, unit: float, step: float) -> Law
     if line is None:
         return None
     middle = float(np.rint((steps[0] + steps[-1]) / 2))
-    top = (3 * 2.0**22 - middle) * step  # there binary32 numbers are steps apart
+    top = (3 * 2.0**22 - middle) * step  # binary32 numbers are steps apart there
     law = Law(line[0], line[1] + top, finest - top)
     return law if _usable(law.unit, line[1] + top, finest - top) else None

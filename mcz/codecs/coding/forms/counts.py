@@ -21,14 +21,14 @@ from mcz.model.numbers.magnitudes import POWERS
 from mcz.model.types import Bools, Floats, Ints
 
 OFFSET, SHIFT, RESTS = 1, 2, 4  # bits of ``parts``
-MOST = 2.0**80  # an offset or a shift: sums are then finite in binary32
+MOST_OFFSET = 2.0**80  # an offset or a shift: sums are then finite in binary32
 
 
 @dataclass(frozen=True, slots=True)
 class Law:
     """Value of a count: ``binary32(binary32(count * unit + offset) + shift)``.
 
-    ``offset`` None: nothing is added; ``shift`` None: nor is the second sum made.
+    ``offset`` None: the first sum is omitted; ``shift`` None: the second too.
     """
 
     unit: float
@@ -46,7 +46,7 @@ class Law:
         return ordinals_of_binary32(rounded, grid)
 
     def fields(self, *, rests: bool) -> bytes:
-        """``unit``, ``parts`` and what they say is there."""
+        """``unit``, ``parts`` and the values of the present parts."""
         terms = self.offset, self.shift
         parts = sum(1 << bit for bit, term in enumerate(terms) if term is not None)
         data = struct.pack("<dB", self.unit, parts | RESTS * rests)
@@ -54,7 +54,7 @@ class Law:
 
 
 def parse_law(stream: bytes, at: int, unit: float) -> tuple[Law, bool, int]:
-    """The law whose ``parts`` stand at an offset, whether there are rests, the offset after it."""
+    """The law whose ``parts`` are at an offset, whether there are rests, the offset after it."""
     if at >= len(stream) or stream[at] > OFFSET | SHIFT | RESTS:  # FAST-52
         raise FormatError(f"parts {stream[at : at + 1].hex() or 'missing'} of a law")
     parts, at = stream[at], at + 1
@@ -64,7 +64,7 @@ def parse_law(stream: bytes, at: int, unit: float) -> tuple[Law, bool, int]:
             if at + 8 > len(stream):
                 raise FormatError(f"the stream ends at {len(stream)}, in a law")
             (term,) = struct.unpack_from("<d", stream, at)
-            if not -MOST <= term <= MOST:  # FAST-53
+            if not -MOST_OFFSET <= term <= MOST_OFFSET:  # FAST-53
                 raise FormatError(f"an offset or shift of {term!r}")
             terms[place], at = term, at + 8
     return Law(unit, *terms), bool(parts & RESTS), at
@@ -88,7 +88,7 @@ def ordinals_of_binary32(values: Floats32, grid: Grid) -> Ints:
 def spacing(values: Floats, grid: Grid, least: float = LEAST_NORMAL) -> Floats:
     """Twice the error of values that are binary32 numbers on ``grid``.
 
-    Values below ``least`` are taken for it.
+    Values below ``least`` count as ``least``.
     """
     sizes = np.maximum(np.abs(values), least)
     steps = np.asarray(np.spacing(sizes.astype("<f4")), np.float64)
@@ -115,20 +115,20 @@ def _last_places(sizes: Floats, grid: Grid) -> Floats:
     return POWERS[np.maximum(first - (grid.digits - 1), 0)]
 
 
-WINDOWS, SEEN = 4, 128  # runs of rows that are looked at, and their length
+WINDOWS, SEEN = 4, 128  # runs of rows of the test, and their length
 FEWEST = 9  # distinct values in a window that shows something
 ENOUGH = 2  # windows that show something
-WIDE = 4.0  # last places in a gap between values, at least
-NEAR = 16.0  # times the unit that a gap may have to tell something
-PARTS = 1, 2, 3  # of the least gap, one of which may be the unit
-LOOSE = 0.25  # of a unit that a gap may be off
-ROUNDING = 2.0**-23  # of a number: twice what rounding takes of it, at most
+WIDE = 4.0  # last places of a difference between values, at least
+FEWEST_UNITS = 16.0  # units of a difference that can confirm a unit
+PARTS = 1, 2, 3  # of the least difference, one of which may be the unit
+LOOSE = 0.25  # of a unit, greatest deviation of a difference
+ROUNDING = 2.0**-23  # of a number: twice its greatest rounding error
 
 
 def may_be_counts(ordinals: Ints, columns: Ints, grids: Sequence[Grid]) -> Bools:
-    """Tell the ``columns`` of ``ordinals`` in which no window of rows shows that there is no unit.
+    """Mask of ``columns`` of ``ordinals`` in which no window of rows disproves a unit.
 
-    Those with few distinct values are among them; ``grids`` are of the columns.
+    Columns of few distinct values are included; ``grids`` are of the columns.
     """
     hopeful, left = np.ones(len(columns), np.bool_), np.full(len(columns), ENOUGH)
     digits = np.array([grid.digits for grid in grids])
@@ -144,7 +144,7 @@ def may_be_counts(ordinals: Ints, columns: Ints, grids: Sequence[Grid]) -> Bools
         hopeful[some] = are_numbers
         some, block = some[are_numbers], np.ascontiguousarray(block[:, are_numbers])
         values = np.sort(values_of(block, tuple(grids[n] for n in some.tolist())).T)
-        with np.errstate(over="ignore"):  # a gap beyond binary64 tells nothing
+        with np.errstate(over="ignore"):  # a difference beyond binary64 proves nothing
             gaps = np.diff(values)
         tells = 1 + np.count_nonzero(gaps, axis=1) >= FEWEST
         some = some[tells]
@@ -155,19 +155,19 @@ def may_be_counts(ordinals: Ints, columns: Ints, grids: Sequence[Grid]) -> Bools
 
 
 def _have_unit(gaps: Floats, greatest: Floats, digits: Ints) -> Bools:
-    """Most gaps between sorted values are whole numbers of the least one, or of a part of it."""
+    """Mask of columns whose differences are mostly multiples of one unit."""
     places = 10.0 ** (np.floor(np.log10(greatest)) - digits + 1)  # values of last digits
     slack = (places + ROUNDING * greatest)[:, None]
     gaps = np.where(gaps > WIDE * slack, gaps, np.inf)
     least = gaps.min(axis=1, keepdims=True, initial=np.inf)
-    least[np.isinf(least)] = 1.0  # no gap is wide
+    least[np.isinf(least)] = 1.0  # no difference is wide
     ratios = gaps / least
-    found = np.zeros(len(digits), np.bool_)
+    has_unit = np.zeros(len(digits), np.bool_)
     for parts in PARTS:
-        unit, near = least / parts, parts * ratios <= NEAR
+        unit, near = least / parts, parts * ratios <= FEWEST_UNITS
         counts = np.where(near, parts * ratios, 0.0)
         off = np.abs(counts - np.rint(counts)) * unit
         good = near & (off <= np.minimum(LOOSE * unit, slack * (1.0 + counts / parts)))
         n_near, n_good = near.sum(axis=1), good.sum(axis=1)
-        found |= (n_near >= FEWEST - 1) & (8 * n_good >= 7 * n_near)
-    return found
+        has_unit |= (n_near >= FEWEST - 1) & (8 * n_good >= 7 * n_near)
+    return has_unit

@@ -17,20 +17,20 @@ from mcz.model.types import Floats, Ints
 
 DEGREE = 180 / np.pi  # in a radian
 LARGEST = 1e-12  # degrees: numbers near 1e-9 are products by chance
-EXACT = 2**52  # codes below are exact as floats, as are their multiples
+EXACT_CODES = 2**52  # smaller codes are exact as floats, as are their multiples
 _UNITS = np.asarray(DEGREE * 2.0 ** -np.arange(44, 77), np.float64)
 
 
 def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
-    """The ordinals on ``grid``, which is GENERAL, of the multiples of ``unit`` that ``codes`` say.
+    """The ordinals on ``grid``, which is GENERAL, of the multiples of ``unit`` in ``codes``.
 
-    A code has a sign, and its size less 1 is q * shifts + z: it says (2q + 1) * 2^z units.
+    A code has a sign, and its size less 1 is q * shifts + z: it stands for (2q + 1) * 2^z units.
     """
     from mcz.codecs.coding.forms import product_kernels as own  # on first use
 
     codes = np.ascontiguousarray(codes)
     out = np.full(len(codes), own.PRINTED)
-    all_printed = lacks_compiled_kernels() and bool((np.abs(codes) < EXACT).all())
+    all_printed = lacks_compiled_kernels() and bool((np.abs(codes) < EXACT_CODES).all())
     if all_printed or own.fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
         printed = out == own.PRINTED
         few, places = np.unique(codes[printed], return_inverse=True)  # often small ones
@@ -41,7 +41,7 @@ def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
 
 
 def multiples_of(codes: Ints, shifts: int) -> Floats:
-    """The multiples that codes say, exact; 0 for 0."""
+    """The multiples of codes, exact; 0 for 0."""
     q, z = np.divmod(np.abs(codes) - 1, shifts)
     return np.where(codes == 0, 0.0, np.copysign(np.ldexp(2.0 * q + 1, z), codes))
 
@@ -56,12 +56,12 @@ def is_tiny(ordinals: Ints, grid: Grid) -> bool:
 
 @cache
 def tiny_limit(grid: Grid) -> int:
-    """The magnitude of LARGEST; 0 on grids that have no rounding noise."""
+    """The magnitude of LARGEST; 0 on grids without rounding noise."""
     return int(grid.ordinals(np.array([LARGEST]))[0][0]) if grid.kind == GridKind.GENERAL else 0
 
 
 def find_products(ordinals: Ints, grid: Grid) -> tuple[float, int, Ints] | None:
-    """A unit, shifts and the codes that ``of_products`` turns into these ordinals, or None."""
+    """A unit, shifts and the codes of these ordinals for ``of_products``, or None."""
     if not is_tiny(ordinals, grid):
         return None
     from mcz.codecs.coding.forms import product_kernels as own  # on first use

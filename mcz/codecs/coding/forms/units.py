@@ -1,4 +1,4 @@
-"""Channels whose ordinals are made of integers by a unit: fields of a head, and what is coded.
+"""Channels with ordinals from integers and a unit: fields of a head, and coded integers.
 
 SPEC.md, "Codec 1: fast", is normative; the choice of a form is not. ``of_multiples`` is form 32:
 integers scaled by some recorder.
@@ -36,9 +36,9 @@ MAX_SHIFTS = 63
 
 @dataclass(frozen=True, slots=True)
 class InUnits:
-    """A channel in a form with a unit; ``fields``: those of the head that belong to the form.
+    """A channel in a form with a unit; ``fields``: the fields of the form in the head.
 
-    ``rests``: what the ordinals of ``integers`` are off, None where nothing is.
+    ``rests``: errors of the ordinals of ``integers``, None without any.
     """
 
     form: int
@@ -48,17 +48,17 @@ class InUnits:
 
 
 def find_units(column: Ints, grid: Grid, *, every: bool = True) -> InUnits | None:
-    """The ordinals of ``grid`` in a form with a unit, None where none fits.
+    """The ordinals of ``grid`` in a form with a unit, None if none fits.
 
-    ``every``: products and counts may be chosen, too.
+    ``every``: products and counts are tried too.
     """
     if has_binary32(grid):
-        found = find_multiples(column)
-        law = find_counts(column, BINARY32, found) if every else None
+        in_units = find_multiples(column)
+        law = find_counts(column, BINARY32, in_units) if every else None
         if law is not None:
             return _in_counts(law)
-        if found is not None:
-            return InUnits(MULTIPLES, struct.pack("<d", found[0]), found[1])
+        if in_units is not None:
+            return InUnits(MULTIPLES, struct.pack("<d", in_units[0]), in_units[1])
     if not every or grid.kind != GridKind.GENERAL:
         return None
     if is_tiny(column, grid):
@@ -75,9 +75,9 @@ def find_units(column: Ints, grid: Grid, *, every: bool = True) -> InUnits | Non
     return _in_counts(law)
 
 
-def _in_counts(found: Counted) -> InUnits:
-    rests = found.rests if found.rests.any() else None
-    return InUnits(COUNTS, found.law.fields(rests=rests is not None), found.counts, rests)
+def _in_counts(counted: Counted) -> InUnits:
+    rests = counted.rests if counted.rests.any() else None
+    return InUnits(COUNTS, counted.law.fields(rests=rests is not None), counted.counts, rests)
 
 
 def parse_mapping(
@@ -111,7 +111,7 @@ def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
     return unit, at + 8
 
 
-MOST = 2**20  # units in a value: beyond, the multiples take as many bits as the mantissas
+MOST_UNITS = 2**20  # units in a value: beyond, the multiples take as many bits as the mantissas
 GREATEST = 2.0**80  # unit that a head may have
 _STEPS = 24  # of Euclid's algorithm
 
@@ -125,7 +125,7 @@ def of_multiples(multiples: Ints, unit: float, grid: Grid = BINARY32) -> Ints:
 
 @np.errstate(over="ignore")  # numbers near the greatest
 def find_multiples(ordinals: Ints) -> tuple[float, Ints] | None:
-    """A unit and the multiples of it that ``of_multiples`` turns into these ordinals, or None."""
+    """A unit and the multiples of it that ``of_multiples`` maps to these ordinals, or None."""
     if ordinals.max() > BINARY32.limit or ordinals.min() < BINARY32.lowest:
         return None
     values = BINARY32.values(ordinals)
@@ -135,7 +135,7 @@ def find_multiples(ordinals: Ints) -> tuple[float, Ints] | None:
         return None
     slack = float(np.spacing(np.float32(sizes[-1])))
     guess = _common_measure(sizes, slack)
-    if guess * MOST < sizes[-1]:
+    if guess * MOST_UNITS < sizes[-1]:
         return None
     unit = _within_rounding(sizes, guess)
     if unit > GREATEST:
@@ -160,7 +160,7 @@ def _within_rounding(sizes: Floats, guess: float) -> float:
     """The middle of the units that round to all sizes, close to ``guess``."""
     low, high = 0.0, np.inf
     unit = guess
-    for size in sizes:  # small multiples first: each narrows what the next one is divided by
+    for size in sizes:  # small multiples first: each narrows the divisors of the next
         count = max(1.0, np.rint(size / unit))
         half = float(np.spacing(np.float32(size))) / 2
         low, high = max(low, (size - half) / count), min(high, (size + half) / count)

@@ -1,4 +1,4 @@
-"""Motions as scenes of animated nodes, which viewers and tools of animation read."""
+"""Motions as scenes of animated nodes, for viewers and tools of animation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mcz.model.text_format import brief
 from mcz.version import VERSION
 
 KEY_ERROR_MM = 0.1
-KEY_ERROR_SIZE = 1 / 20_000  # of the figure, where its unit is unknown: 0.1 mm of 2 m
+KEY_ERROR_SIZE = 1 / 20_000  # of the figure, if its unit is unknown: 0.1 mm of 2 m
 MM_PER_M = 1000.0
 WRITERS = {"glb": glb, "usda": usda}
 GENERATOR = f"mcz {VERSION}"
@@ -29,13 +29,13 @@ GREATEST = 2.0**100  # of a coordinate, in meters
 
 @dataclass(frozen=True, slots=True)
 class SceneFile:
-    """A scene as a file: ``data``, and what became of the motion.
+    """A scene as a file: ``data``, and its errors.
 
     ``key_error`` is the bound that was kept, ``max_error`` the greatest distance of a joint or an
-    end of a bone (or a marker) from where the motion has it, over all frames; it is met in
+    end of a bone (or a marker) from its place in the motion, over all frames; it is met in
     ``frame`` by ``point``. Both are in mm; in length units of the motion where ``has_unit`` is
-    False. ``n_keys`` keys are left of ``n_values``, one a frame and channel. ``notes`` say what
-    was taken for granted and what was left out.
+    False. ``n_keys`` keys are left of ``n_values``, one a frame and channel. ``notes`` list
+    assumptions and omissions.
     """
 
     data: bytes
@@ -60,7 +60,7 @@ def to_scene(
     unit: str | None = None,
     up: str | None = None,
 ) -> SceneFile:
-    """``motion`` as a file of the format ``to``, "glb" or "usda"; see those."""
+    """``motion`` as a file of the format ``to``, "glb" or "usda"; see those functions."""
     if to not in WRITERS:
         raise OptionError(f"no scene as {to!r}, but as {', '.join(WRITERS)}")
     motion = SourceOptions(rate=rate, unit=unit, up=up).applied_to(motion)
@@ -113,10 +113,10 @@ def to_glb(
     """``motion`` as binary glTF 2.0: an animated skeleton with solid bones, or markers.
 
     Keys are left out where interpolation keeps every joint, end of a bone and marker within
-    ``key_error_mm`` in every frame, by default 0.1 mm; where the length unit is unknown, within
+    ``key_error_mm`` in every frame, by default 0.1 mm; if the length unit is unknown, within
     1/20,000 of the figure's size. 0: a key in every frame. ``rate``, ``unit`` ("cm", "m", ...) and
-    ``up`` ("x" to "-z") are used in place of the motion's own; where the last two are unknown, a
-    unit becomes a meter and y points up, and ``notes`` say so.
+    ``up`` ("x" to "-z") replace the motion's own; if the last two are unknown, a unit becomes a
+    meter and y points up, and ``notes`` mention it.
 
     Raises OptionError where the frame rate is unknown, and where float32 numbers cannot keep the
     bound; MotionError where the skeleton has no kinematics, or lacks a joint in some frame.
@@ -133,8 +133,8 @@ def to_usda(
 ) -> SceneFile:
     """``motion`` as USD in text: a UsdSkel skeleton with solid bones, or a sphere a marker.
 
-    Every frame is a sample, so that ``max_error`` is that of float32 numbers. Arguments and errors
-    are those of ``to_glb``.
+    Every frame is a sample, so that ``max_error`` is the error of float32 numbers. Arguments and
+    errors are as in ``to_glb``.
     """
     return to_scene(motion, "usda", rate=rate, unit=unit, up=up)
 
@@ -155,8 +155,7 @@ def _bound(scene: Scene, key_error_mm: float | None) -> float:
 
 
 def _check_size(scene: Scene) -> None:
-    """Raise MotionError where a place is beyond float32."""
     for node in scene.nodes:
-        places: Any = np.abs(node.places[node.seen])
+        places: Any = np.abs(node.places[node.is_visible])
         if not (places < GREATEST).all() or not (np.abs(node.rest) < GREATEST).all():
             raise MotionError(f"node {node.name!r} is farther away than float32 numbers reach")

@@ -1,8 +1,8 @@
-"""A scene as binary glTF 2.0 (ISO/IEC 12113): one file that any viewer shows.
+"""A scene as binary glTF 2.0 (ISO/IEC 12113): one file for any viewer.
 
-The node of the motion's name turns the axis that points up to y; the joints hang on it and stand at
-rest, and all that moves is in one animation. Bones are a mesh, skinned to the joints. Markers are
-nodes with a mesh each; glTF has no visibility, so those that are missing are scaled to 0, in steps.
+The node of the motion's name turns the up axis to y; the joints are below it at rest, and one
+animation moves all nodes. Bones are a mesh, skinned to the joints. Markers are nodes with a mesh
+each; glTF has no visibility, so missing ones are scaled to 0, in steps.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from mcz.kinematics.chain import Floats
 from mcz.model.types import Items, JsonObject
 
 UBYTE, USHORT, UINT, FLOAT = 5121, 5123, 5125, 5126  # component types
-VERTICES, INDICES = 34962, 34963  # what a buffer view is for
+VERTICES, INDICES = 34962, 34963  # purposes of a buffer view
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 HALF = 0.5**0.5
 UP_TURNS = {  # that axis to y, x y z w
@@ -56,7 +56,7 @@ def glb(scene: Scene, keys: Keyed, generator: str, extras: JsonObject) -> bytes:
 
 
 class _Document:
-    """The parts of the file, as they are collected. Node 0 turns the axis that points up."""
+    """The parts of the file, as they are collected. Node 0 turns the up axis."""
 
     def __init__(self, scene: Scene, keys: Keyed) -> None:
         self.scene, self.keys = scene, keys
@@ -101,7 +101,7 @@ class _Document:
         )
 
     def _nodes(self) -> list[JsonObject]:
-        """Node 0, then those of the scene, then that of the mesh where there is one skin."""
+        """Node 0, then those of the scene, then the mesh's if there is one skin."""
         scene = self.scene
         roots = [number + 1 for number, node in enumerate(scene.nodes) if node.parent < 0]
         top: JsonObject = {"name": scene.name, "children": roots}
@@ -117,7 +117,7 @@ class _Document:
                 made["children"] = [number + 1 for number in below]
             if scene.is_markers:
                 made["mesh"] = self.sides.index(node.side)
-                if not node.seen.any():
+                if not node.is_visible.any():
                     made["scale"] = [0.0, 0.0, 0.0]
             nodes.append(made)
         if not scene.is_markers:
@@ -160,7 +160,6 @@ class _Document:
         return self._accessor(data, code, view=self._view(INDICES))
 
     def _knobs(self) -> list[JsonObject]:
-        """A mesh for each color of markers."""
         corners = knob(MARKER * self.scene.size).astype("<f4")
         position = self._accessor(corners, FLOAT, True, self._view(VERTICES))
         indices = self._indices(OCTAHEDRON, len(corners))
@@ -198,15 +197,15 @@ class _Document:
                 add(number, "rotation", turns, "LINEAR")
             if shifts is not None:
                 add(number, "translation", shifts, "LINEAR")
-            if self.scene.is_markers and 0 < node.seen.sum() < len(node.seen):
-                add(number, "scale", _sizes(node.seen), "STEP")
+            if self.scene.is_markers and 0 < node.is_visible.sum() < len(node.is_visible):
+                add(number, "scale", _sizes(node.is_visible), "STEP")
         if not channels:
             self.views.pop()
             return []
         return [{"name": self.scene.name, "channels": channels, "samplers": samplers}]
 
     def _view(self, target: int | None = None) -> int:
-        """A new buffer view, at the end of the buffer, for what is added next."""
+        """A new buffer view, at the end of the buffer, for the next numbers."""
         self.buffer += bytes(-len(self.buffer) % 4)
         view: JsonObject = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": 0}
         if target is not None:
@@ -232,7 +231,7 @@ class _Document:
 
 
 def _sizes(seen: NDArray[np.bool_]) -> Keys:
-    """Keys of the scale of a marker: 1 while it is seen, 0 while it is missing."""
+    """Keys of the scale of a marker: 1 while it is visible, 0 while it is missing."""
     frames = np.flatnonzero(np.diff(seen, prepend=~seen[:1]))
     values = np.repeat(seen[frames, None], 3, axis=1)
     return Keys(frames, values.astype(np.float32))
@@ -250,5 +249,4 @@ def _material(side: str) -> JsonObject:
 
 
 def _floats(values: Sequence[Any] | Items | Floats) -> list[float]:
-    """Numbers as float32 has them."""
     return [float(value) for value in np.asarray(values, np.float32)]

@@ -1,7 +1,8 @@
-"""Compiled: keys chosen among frames, what lies between them, and where it puts the nodes.
+"""Compiled: keys chosen among frames, interpolation between them, and the resulting places of
+nodes.
 
-Keys are vectors of 3, between which interpolation is linear, or quaternions of 4, x y z w, between
-which it is spherical, as glTF has it. Imported on first use only.
+Keys are vectors of 3, with linear interpolation, or quaternions of 4, x y z w, with spherical
+interpolation, as in glTF. Imported on first use only.
 """
 
 from __future__ import annotations
@@ -18,27 +19,27 @@ STRAIGHT = 1e-12  # square of the distance of two quaternions between which all 
 
 @kernel
 def choose(times: Floats, exact: Floats2, rounded: Floats2, limits: Floats, kept: Bytes) -> None:
-    """Mark in ``kept`` (n_frames,) which frames become keys: from each the farthest that will do.
+    """Mark in ``kept`` (n_frames,) the frames that become keys: from each the farthest possible.
 
-    ``exact`` (n_frames, 3 or 4) is what is wanted, ``rounded`` what a key has; ``limits``
-    (n_frames,) is how far what lies between keys may be from what is wanted.
+    ``exact`` (n_frames, 3 or 4) are the targets, ``rounded`` the values of keys; ``limits``
+    (n_frames,) are the greatest distances of interpolated values from their targets.
     """
     n = len(exact)
-    scratch, found = np.empty(4), np.empty(4)
+    scratch, interpolated = np.empty(4), np.empty(4)
     kept[:] = 0
     kept[0] = 1
     first = 0
     while first < n - 1:
         low, step = first + 1, 2
         while first + step < n and _fits(
-            times, exact, rounded, limits, first, first + step, scratch, found
+            times, exact, rounded, limits, first, first + step, scratch, interpolated
         ):
             low = first + step
             step *= 2
         high = min(first + step, n)
         while high - low > 1:
             middle = (low + high) // 2
-            if _fits(times, exact, rounded, limits, first, middle, scratch, found):
+            if _fits(times, exact, rounded, limits, first, middle, scratch, interpolated):
                 low = middle
             else:
                 high = middle
@@ -54,7 +55,7 @@ def _fits(
     first: int,
     last: int,
     scratch: Floats,
-    found: Floats,
+    interpolated: Floats,
 ) -> bool:
     """Return True if all frames between two keys of one hemisphere are near enough."""
     width = exact.shape[1]
@@ -64,17 +65,17 @@ def _fits(
     span = times[last] - times[first]
     for frame in range(first + 1, last):
         share = (times[frame] - times[first]) / span
-        _between(rounded[first], rounded[last], width, angle, share, found)
+        _between(rounded[first], rounded[last], width, angle, share, interpolated)
         square = 0.0
         for k in range(width):
-            square += (found[k] - exact[frame, k]) ** 2
+            square += (interpolated[k] - exact[frame, k]) ** 2
         if not square <= limits[frame] * limits[frame]:
             return False
     return True
 
 
 def _angle(one: Floats, other: Floats, width: int) -> float:
-    """Angle between quaternions, 0 where linear will do; -1 beyond 90 degrees."""
+    """Angle between quaternions, 0 where linear interpolation suffices; -1 beyond 90 degrees."""
     if width == 3:
         return 0.0
     dot, square = 0.0, 0.0
@@ -95,7 +96,7 @@ def _angle(one: Floats, other: Floats, width: int) -> float:
 def _between(
     one: Floats, other: Floats, width: int, angle: float, share: float, out: Floats
 ) -> None:
-    """Write to ``out`` what lies at ``share`` of the way; quaternions get the length 1."""
+    """Write the interpolation at ``share`` to ``out``; quaternions get the length 1."""
     start, end = 1.0 - share, share
     if angle > 0.0:
         sine = math.sin(angle)
@@ -111,13 +112,13 @@ def _between(
 
 @kernel
 def fill(times: Floats, frames: Ints, keys: Floats2, first: int, key: int, out: Floats2) -> None:
-    """Write to ``out`` (n, 3 or 4) what keys make of the frames from ``first`` on.
+    """Write the interpolation of keys from frame ``first`` on to ``out`` (n, 3 or 4).
 
-    ``frames`` (n_keys,) and ``keys`` (n_keys, 3 or 4); key number ``key`` is the last one that is
-    not behind frame ``first``. Behind the last key its value stays.
+    ``frames`` (n_keys,) and ``keys`` (n_keys, 3 or 4); key number ``key`` is the last one at or
+    before frame ``first``. After the last key its value stays.
     """
     width = keys.shape[1]
-    found = np.empty(4)
+    interpolated = np.empty(4)
     angle = -2.0
     for number in range(len(out)):
         frame = first + number
@@ -131,9 +132,9 @@ def fill(times: Floats, frames: Ints, keys: Floats2, first: int, key: int, out: 
         if last > key:
             start = times[frames[key]]
             share = (times[frame] - start) / (times[frames[last]] - start)
-        _between(keys[key], keys[last], width, angle, share, found)
+        _between(keys[key], keys[last], width, angle, share, interpolated)
         for k in range(width):
-            out[number, k] = found[k]
+            out[number, k] = interpolated[k]
 
 
 @kernel

@@ -1,9 +1,9 @@
 """Keys of a scene: the frames that are needed so that every node stays within a bound.
 
-What lies between keys is interpolated as glTF has it. Each channel, the turns or the shifts of a
-node, gets a limit in every frame; its keys are chosen in one pass. Then all nodes are placed by
-these very keys, rounded to float32 as they are in a file. Where a node is too far off, the limits
-of what moves it are tightened there, and the keys are chosen anew.
+Interpolation is glTF's. Each channel, the turns or the shifts of a node, gets a limit in every
+frame; its keys are chosen in one pass. Then all nodes are placed by these keys, rounded to float32
+as in the file. If a node is too far off, the limits of the channels that move it are tightened
+there, and the keys are chosen again.
 """
 
 from __future__ import annotations
@@ -19,16 +19,15 @@ from mcz.exchange.conversion.scenes.key_kernels import choose, fill, hang
 from mcz.exchange.conversion.scenes.nodes import Node, Scene
 from mcz.hints import Hint
 from mcz.kinematics.chain import Floats
+from mcz.model.types import Ints
 
-Ints = NDArray[np.int64]
-
-SHARE = 1.2  # of the bound that a channel alone may use up at first
+SHARE = 1.2  # share of the bound that a single channel may use at first
 TIGHTER = 0.75
-ROUNDS = 40  # after so many, what is still too far off gets a key in each frame
+ROUNDS = 40  # after so many, nodes that are too far off get a key in each frame
 BLOCK_FRAMES = 4096
-SAMPLED_FRAMES = 200  # by which levers are judged
+SAMPLED_FRAMES = 200  # for estimates of levers
 NO_TURN = np.array([[0.0, 0.0, 0.0, 1.0]])
-FREE = 1e-3  # limit of what turns nothing but itself
+FREE = 1e-3  # limit of a channel that turns only its own node
 
 
 @dataclass(slots=True, eq=False)
@@ -40,12 +39,12 @@ class Keys:
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
-    """A scene as its keys show it.
+class KeyErrors:
+    """The errors of a scene with its keys.
 
-    ``error`` is the greatest distance of a node from where it should be, over all frames, in
-    meters, or in units where these are unknown; it is met in ``frame`` by ``point``. ``n_keys`` of
-    ``n_values`` that keys in every frame would have been.
+    ``error`` is the greatest distance of a node from its exact place, over all frames, in meters,
+    or in units if these are unknown; it is met in ``frame`` by ``point``. ``n_keys`` of the
+    ``n_values`` that keys in every frame would have.
     """
 
     error: float
@@ -61,13 +60,13 @@ class Keyed:
 
     turns: list[Keys | None]
     shifts: list[Keys | None]
-    reached: Reached
+    reached: KeyErrors
 
 
 def keyed(scene: Scene, bound: float) -> Keyed:
-    """The keys of ``scene`` by which no node is farther off than ``bound``; 0: in every frame.
+    """The keys of ``scene`` that keep every node within ``bound``; 0: a key in every frame.
 
-    Raises OptionError where float32 numbers alone are farther off.
+    Raises OptionError where float32 numbers alone exceed it.
     """
     return _Keyer(scene, bound).run()
 
@@ -82,7 +81,7 @@ class _Channel:
     keys: Keys = field(init=False)
 
     def choose(self, times: Floats) -> None:
-        """Choose the keys anew."""
+        """Choose all keys again."""
         off = np.sqrt(((self.exact - self.rounded[:1]) ** 2).sum(axis=1))
         if (off <= self.limits).all() or (self.exact == self.exact[:1]).all():
             kept = np.zeros(1, np.int64)
@@ -92,7 +91,7 @@ class _Channel:
             kept = np.flatnonzero(marks)
             width = self.exact.shape[1]
             if (width + 1) * len(kept) >= width * len(times):
-                kept = np.arange(len(times))  # as short, for all such channels share their times
+                kept = np.arange(len(times))  # as short: all such channels share their times
         self.keys = Keys(kept, self.rounded[kept].astype(np.float32))
 
     def fill(self, times: Floats, first: int, stop: int) -> Floats:
@@ -112,7 +111,7 @@ class _Keyer:
     def _turns(self, node: Node, lever: float) -> _Channel | None:
         if node.turns is None or not len(node.turns):
             return None
-        # Quaternions are half as far from each other as what they turn, a lever of 1 long.
+        # The distance of quaternions is half the distance at the end of a lever of 1.
         limit = SHARE * self.bound / (2.0 * lever) if lever else FREE
         return _channel(node.turns, limit, node)
 
@@ -122,7 +121,7 @@ class _Keyer:
         return _channel(node.shifts, SHARE * self.bound, node)
 
     def run(self) -> Keyed:
-        """Choose keys until all nodes are where they should be."""
+        """Choose keys until all nodes are within the bound."""
         times = self.scene.times
         for channel in self._channels():
             channel.choose(times)
@@ -151,7 +150,6 @@ class _Keyer:
 
     @staticmethod
     def _keys(channel: _Channel | None, rest: Floats) -> Keys | None:
-        """The keys of a channel, None where they say nothing but the rest."""
         if channel is None:
             return None
         at_rest = (
@@ -160,7 +158,7 @@ class _Keyer:
         return None if at_rest else channel.keys
 
     def _tighten(self, wrong: NDArray[np.bool_], by: float) -> None:
-        """Tighten what moves the nodes that are ``wrong``, (n_frames, n_nodes), where they are."""
+        """Tighten the channels that move the nodes that are ``wrong``, (n_frames, n_nodes)."""
         moved = wrong.copy()  # of each node, whether a node below it or it itself is wrong
         below = np.zeros_like(wrong)
         for number in range(len(self.nodes) - 1, -1, -1):
@@ -200,21 +198,21 @@ class _Keyer:
         hang(above[0], above[1], turns, shifts, out_turns, out_places)
         return out_turns, out_places
 
-    def _reached(self, errors: Floats) -> Reached:
+    def _reached(self, errors: Floats) -> KeyErrors:
         channels = list(self._channels())
         n_keys = sum(len(channel.keys.frames) for channel in channels)
         n_values = len(self.scene.times) * len(channels)
         if not errors.size:
-            return Reached(0.0, None, None, n_keys, n_values)
+            return KeyErrors(0.0, None, None, n_keys, n_values)
         frame, number = divmod(int(errors.argmax()), errors.shape[1])
         worst = float(errors[frame, number])
-        return Reached(worst, frame, self.nodes[number].name, n_keys, n_values)
+        return KeyErrors(worst, frame, self.nodes[number].name, n_keys, n_values)
 
 
 def _channel(exact: Floats, limit: float, node: Node) -> _Channel:
     rounded = exact.astype(np.float32).astype(np.float64)
     limits = np.full(len(exact), limit)
-    limits[~node.seen] = np.inf
+    limits[~node.is_visible] = np.inf
     return _Channel(np.ascontiguousarray(exact), rounded, limits)
 
 

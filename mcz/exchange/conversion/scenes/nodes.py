@@ -1,8 +1,8 @@
-"""A motion as a scene: nodes that hang on each other, turned and moved over time, in meters.
+"""A motion as a scene: a tree of nodes, turned and moved over time, in meters.
 
-Nodes are the joints and, below them, the ends of bones at which no joint begins. What stretches a
-bone moves the nodes at its other end, so that no node is scaled: scales of glTF and USD would be
-inherited, and those of a motion are not.
+Nodes are the joints and, below them, the ends of bones without a joint. Stretching of a bone moves
+the nodes at its other end, so that no node is scaled: scales of glTF and USD would be inherited,
+and those of a motion are not.
 """
 
 from __future__ import annotations
@@ -26,22 +26,23 @@ from mcz.kinematics.poses.conversions import from_matrices
 from mcz.kinematics.retargeting.sides import sides_of
 from mcz.model.clock import Timeline
 from mcz.model.motion import TURNING_KINDS, Motion, check_poses
+from mcz.model.types import Ints
 
 CM_PER_M = 100.0
-NEAR = 1e-6  # frames: a time code that is off by less is a whole number
-SAMPLED_FRAMES = 500  # by which the size of a set of markers is judged
-UNSIZED = 1.0  # m, the size of a scene that has none
+WHOLE_CODE = 1e-6  # frames: a time code that is off by less is a whole number
+SAMPLED_FRAMES = 500  # for the size of a set of markers
+UNSIZED = 1.0  # m, the size of a scene without one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
     """A joint, the end of a bone, or a marker.
 
-    ``parent`` counts among the nodes, -1: none. ``rest`` (3,) is where it is at rest, from its
-    parent. ``turns`` (n_frames, 4) are unit quaternions, x y z w, from its parent, neighbors near
-    each other; None: never turned. ``shifts`` (n_frames, 3) is where it is from its parent; None:
-    at ``rest``. ``places`` (n_frames, 3) is where it is in the world, NaN where unknown.
-    ``side`` is "left", "right" or "" as its name says.
+    ``parent`` is an index of nodes, -1: none. ``rest`` (3,) is its offset at rest from its parent.
+    ``turns`` (n_frames, 4) are unit quaternions, x y z w, from its parent, neighbors near each
+    other; None: never turned. ``shifts`` (n_frames, 3) is its offset from its parent; None: at
+    ``rest``. ``places`` (n_frames, 3) is its position in the world, NaN where unknown. ``side`` is
+    "left", "right" or "" by its name.
     """
 
     name: str
@@ -53,19 +54,19 @@ class Node:
     side: str
 
     @property
-    def seen(self) -> NDArray[np.bool_]:
-        """In which frames its place is known, (n_frames,)."""
+    def is_visible(self) -> NDArray[np.bool_]:
+        """Mask of the frames in which its position is known, (n_frames,)."""
         return ~np.isnan(self.places[:, 0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """The nodes, parents before children; lengths in meters, or units where these are unknown.
+    """The nodes, parents before children; lengths in meters, or units if these are unknown.
 
-    ``up_axis`` is "x" to "-z"; ``size`` that of the figure; ``times`` (n_frames,) in seconds
-    from the first frame on, float32 numbers as float64; ``start``: the time of the first frame;
-    ``codes`` (n_frames,): the times on the clock of the recording, in frames of ``rate``. ``notes``
-    say in words what is unknown and what was left out.
+    ``up_axis`` is "x" to "-z"; ``size`` the figure's; ``times`` (n_frames,) in seconds from the
+    first frame on, float32 numbers as float64; ``start``: the time of the first frame; ``codes``
+    (n_frames,): the times on the clock of the recording, in frames of ``rate``. ``notes`` list
+    unknown facts and omissions.
     """
 
     name: str
@@ -82,13 +83,13 @@ class Scene:
 
     @property
     def rest_places(self) -> Floats:
-        """Places of the nodes at rest in the world, (n_nodes, 3)."""
-        found = np.zeros((len(self.nodes), 3))
+        """Positions of the nodes at rest in the world, (n_nodes, 3)."""
+        places = np.zeros((len(self.nodes), 3))
         for number, node in enumerate(self.nodes):
-            found[number] = node.rest
+            places[number] = node.rest
             if node.parent >= 0:
-                found[number] += found[node.parent]
-        return found
+                places[number] += places[node.parent]
+        return places
 
     @property
     def children(self) -> list[list[int]]:
@@ -103,15 +104,15 @@ class Scene:
 def scene_of(motion: Motion) -> Scene:
     """The scene of ``motion``, whose times are known.
 
-    Raises MotionError where its skeleton has no kinematics, where a joint of a skeleton is missing
-    in a frame, and where frames are so many that float32 cannot tell their times apart.
+    Raises MotionError for a skeleton without kinematics, for a joint of a skeleton that is missing
+    in a frame, and for so many frames that float32 times would be equal.
     """
     skeleton, timeline = motion.skeleton, motion.timeline
     assert timeline is not None
     rate = _rate(motion, timeline)
     check_poses(motion.name, motion.signals[0])
     if not skeleton.joints:
-        raise MotionError("a skeleton without joints is no scene", clip=motion.name)
+        raise MotionError("a skeleton without joints makes no scene", clip=motion.name)
     scale = 1.0 if skeleton.unit_cm is None else skeleton.unit_cm / CM_PER_M
     is_markers = point_set(skeleton) == "markers"
     nodes = tuple(_markers(motion, scale) if is_markers else _joints(motion, scale))
@@ -119,7 +120,7 @@ def scene_of(motion: Motion) -> Scene:
         motion.name,
         nodes,
         _times(motion.name, timeline, rate),
-        float(timeline.even[0]) if motion.n_frames else 0.0,
+        float(timeline.regular_times[0]) if motion.n_frames else 0.0,
         _codes(timeline, rate),
         rate,
         skeleton.up_axis or "y",
@@ -131,7 +132,6 @@ def scene_of(motion: Motion) -> Scene:
 
 
 def _rate(motion: Motion, timeline: Timeline) -> Fraction:
-    """The frame rate, or the usual one of irregular times."""
     if motion.frame_rate is not None:
         return motion.frame_rate
     usual = 1.0 / timeline.period if timeline.period else 1.0
@@ -139,7 +139,7 @@ def _rate(motion: Motion, timeline: Timeline) -> Fraction:
 
 
 def _times(name: str, timeline: Timeline, rate: Fraction) -> Floats:
-    even = timeline.even
+    even = timeline.regular_times
     seconds = (even - even[:1]).astype(np.float32).astype(np.float64)
     if (np.diff(seconds) <= 0).any() or not np.isfinite(seconds).all():
         raise MotionError(
@@ -152,9 +152,9 @@ def _times(name: str, timeline: Timeline, rate: Fraction) -> Floats:
 
 
 def _codes(timeline: Timeline, rate: Fraction) -> Floats:
-    found = timeline.even * float(rate)
-    near = np.rint(found)
-    return np.where(np.abs(found - near) < NEAR, near, found)
+    codes = timeline.regular_times * float(rate)
+    near = np.rint(codes)
+    return np.where(np.abs(codes - near) < WHOLE_CODE, near, codes)
 
 
 def _notes(motion: Motion) -> Iterator[str]:
@@ -167,7 +167,7 @@ def _notes(motion: Motion) -> Iterator[str]:
 
 
 def _markers(motion: Motion, scale: float) -> Iterator[Node]:
-    """A node a marker, somewhere on its way while it is missing."""
+    """A node a marker, interpolated while it is missing."""
     values = np.asarray(motion.values, np.float64).reshape(
         motion.n_frames, motion.skeleton.n_joints, 3
     )
@@ -195,7 +195,7 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
     used = [column for column, channel in enumerate(skeleton.channels) if channel.kind]
     if gap := first_gap(motion, used):
         raise MotionError(f"joints cannot be left out of frames, but {gap}", clip=motion.name)
-    placed = _Placed(motion, values, scale)
+    placed = _Placements(motion, values, scale)
     names = skeleton.addresses()
     starts = accumulate((1 + len(tails) for tails in placed.tails), initial=0)
     numbers = list(starts)  # of each joint among the nodes
@@ -205,7 +205,7 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
         shifts = placed.shifts.get((index, -1))
         rest = np.array(joint.offset) * scale
         if parent >= 0 and shifts is not None and len(shifts) and not rest.any():
-            rest = shifts[0]  # at rest it would lie on its parent, and its bone could not be seen
+            rest = shifts[0]  # at rest it would lie on its parent, and its bone would be invisible
         turns, places = _turns(motion, values, index), placed.places[index, -1]
         yield Node(name, parent, rest, turns, shifts, places, side)
         for number, tail in placed.tails[index]:
@@ -217,10 +217,10 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
             )
 
 
-class _Placed:
-    """Places of joints (tail -1) and of the loose ends of their bones, (n_frames, 3) in meters.
+class _Placements:
+    """Positions of joints (tail -1) and of the loose ends of their bones, (n_frames, 3) in meters.
 
-    ``shifts`` has those that do not stay where they are on their parent, along its axes.
+    ``shifts`` has those that move relative to their parent, along its axes.
     """
 
     def __init__(self, motion: Motion, values: Floats, scale: float) -> None:
@@ -290,14 +290,12 @@ def _marker_size(nodes: tuple[Node, ...]) -> float:
     return float(np.median(np.sqrt((boxes**2).sum(axis=1)))) or UNSIZED
 
 
-Ints = NDArray[np.int64]
-
 SIDES = ("", "left", "right")
 COLORS = {"": (0.6, 0.6, 0.62), "left": (0.05, 0.25, 0.7), "right": (0.75, 0.2, 0.05)}  # linear
-WIDEST_AT, WIDTH = 0.15, 0.12  # of the bone, from where it begins, and from its middle
+WIDEST_AT, WIDTH = 0.15, 0.12  # of the bone, from its start, and from its middle
 LEAST_WIDTH, GREATEST_WIDTH = 0.007, 0.03  # of the figure
 KNOB, MARKER = 0.012, 0.008  # radius, of the figure, of the markers' box
-LEAST_BONE = 1e-4  # of the figure; what is shorter is not seen
+LEAST_BONE = 1e-4  # of the figure; shorter ones are invisible
 
 # Corners: one end, four around, the other end; triangles counterclockwise from outside.
 OCTAHEDRON = np.array(
@@ -309,8 +307,8 @@ OCTAHEDRON = np.array(
 class Solid:
     """All bones at rest.
 
-    ``corners`` (n, 3) in the world, in meters; ``nodes`` (n,) is what each follows; ``triangles``
-    (m, 3) those of each side that has any.
+    ``corners`` (n, 3) in the world, in meters; ``nodes`` (n,) the node of each; ``triangles`` (m,
+    3) of each side with any.
     """
 
     corners: Floats
@@ -327,12 +325,12 @@ def solid_of(scene: Scene) -> Solid:
         triangles[scene.nodes[start].side].append(OCTAHEDRON + 6 * len(corners))
         corners.append(shape)
         nodes += [start] * 5 + [end]
-    made = {side: np.concatenate(found) for side, found in triangles.items() if found}
+    made = {side: np.concatenate(parts) for side, parts in triangles.items() if parts}
     return Solid(np.concatenate(corners), np.array(nodes, np.int64), made)
 
 
 def _bones(scene: Scene) -> Iterator[tuple[Floats, int, int]]:
-    """The corners of each bone, (6, 3), and the nodes that it and its far end follow."""
+    """The corners of each bone, (6, 3), and the nodes of its start and its far end."""
     places = scene.rest_places
     for number, below in enumerate(scene.children):
         drawn = False
@@ -347,7 +345,6 @@ def _bones(scene: Scene) -> Iterator[tuple[Floats, int, int]]:
 
 
 def _is_reached(scene: Scene, number: int) -> bool:
-    """Return True if a bone ends at the node."""
     rest = scene.nodes[number].rest
     return scene.nodes[number].parent >= 0 and float(rest @ rest) > (LEAST_BONE * scene.size) ** 2
 

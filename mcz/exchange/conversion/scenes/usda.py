@@ -1,7 +1,7 @@
 """A scene as USD in text (.usda): UsdSkel for skeletons, a sphere a marker.
 
 Meters, the up axis of the motion, a sample a frame. Bones are a mesh, bound to the joints of the
-skeleton; only joints that move are in the animation. A marker that is missing is invisible.
+skeleton; only joints that move are in the animation. A missing marker is invisible.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _layer(scene: Scene, name: str, generator: str, facts: JsonObject) -> Iterat
 
 
 def _turned_up(scene: Scene) -> Iterator[str]:
-    """USD knows y and z as up; another axis is turned to y."""
+    """Turn the up axis to y, unless it is y or z, the only ones of USD."""
     if scene.up_axis in UP_TURNS:
         yield f"float3 xformOp:rotateXYZ = {UP_TURNS[scene.up_axis]}"
         yield 'uniform token[] xformOpOrder = ["xformOp:rotateXYZ"]'
@@ -94,7 +94,7 @@ def _markers(scene: Scene, keys: Keyed) -> Iterator[str]:
 
 
 def _visibility(scene: Scene, node: Node) -> Iterator[str]:
-    seen = node.seen
+    seen = node.is_visible
     if seen.all():
         return
     frames = np.flatnonzero(np.diff(seen, prepend=~seen[:1]))
@@ -150,7 +150,6 @@ def _animation(
 
 
 def _dense(keys: Keys | None, rest: Floats, times: Floats) -> NDArray[np.float32]:
-    """A row a frame, or one for all."""
     if keys is None:
         return _float32(rest)[None]
     if len(keys.frames) == 1:
@@ -192,31 +191,32 @@ def _mesh(scene: Scene, solid: Solid, name: str) -> Iterator[str]:
 
 
 def _paths(scene: Scene) -> list[str]:
-    """The path of every joint below its root, of names that USD takes."""
-    found: list[str] = []
+    """The path of every joint below its root, of valid names of USD."""
+    paths: list[str] = []
     for node, name in zip(scene.nodes, identifiers([n.name for n in scene.nodes]), strict=True):
-        found.append(name if node.parent < 0 else f"{found[node.parent]}/{name}")
-    return found
+        paths.append(name if node.parent < 0 else f"{paths[node.parent]}/{name}")
+    return paths
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """Names as USD takes them for prims, each once.
+    """Unique valid names of prims in USD.
 
     >>> identifiers(["Left Foot", "Left_Foot", "3"])
     ['Left_Foot', 'Left_Foot_2', '_3']
     """
-    found: dict[str, None] = {}
-    numbers: dict[str, int] = {}  # the last one of each stem, so that many alike cost no search
+    unique: dict[str, None] = {}
+    # the last one of each stem, so that many equal names need no search
+    numbers: dict[str, int] = {}
     for name in names:
         stem = IDENTIFIER.sub("_", name)
         stem = f"_{stem}" if not stem or stem[0].isdigit() else stem
         made, number = stem, numbers.get(stem, 1)
-        while made in found:
+        while made in unique:
             number += 1
             made = f"{stem}_{number}"
-        found[made] = None
+        unique[made] = None
         numbers[stem] = number
-    return list(found)
+    return list(unique)
 
 
 def quoted(text: str) -> str:
@@ -243,7 +243,6 @@ def _indented(lines: Iterable[str]) -> Iterator[str]:
 
 
 def _number(value: object) -> str:
-    """The shortest text that is read as the same number."""
     text = str(value)  # of a float32 with as many digits as that needs
     return text.removesuffix(".0")
 
