@@ -50,6 +50,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.posewave.head_kernels",
         "mcz.codecs.posewave.model_kernels",
     ),
+    "deflate": ("mcz.sources.arrays.deflate_kernels",),
     "motion": (
         "mcz.codecs.transforms.post_filter_kernels",
         "mcz.container.recovery.kernels",

@@ -6,21 +6,21 @@ import { Refused } from "./errors.js";
 const MAX_BITS = 15;
 const MAX_RATIO = 1032; // bytes that a byte of deflate can become
 const FIRST_BUFFER = 65536;
-const END_OF_BLOCK = 256;
+export const END_OF_BLOCK = 256;
 const NOTHING = new Uint8Array(0);
 
 const CODE_LENGTH_ORDER = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
 const REPEAT_BASE = [3, 3, 11]; // of the code length symbols 16, 17 and 18
 const REPEAT_EXTRA = [2, 3, 7];
-const LENGTH_EXTRA = [
+export const LENGTH_EXTRA = [
   0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 0,
 ];
-const DISTANCE_EXTRA = [
+export const DISTANCE_EXTRA = [
   0, 0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8, 9, 9, 10, 10, 11, 11, 12, 12, 13, 13,
 ];
-const LENGTH_BASE = bases(3, LENGTH_EXTRA);
+export const LENGTH_BASE = bases(3, LENGTH_EXTRA);
 LENGTH_BASE[28] = 258;
-const DISTANCE_BASE = bases(1, DISTANCE_EXTRA);
+export const DISTANCE_BASE = bases(1, DISTANCE_EXTRA);
 
 function bases(first, extra) {
   const list = [];
@@ -42,6 +42,8 @@ class Huffman {
     for (const length of lengths) counts[length]++;
     const used = lengths.length - counts[0];
     const next = new Uint16Array(MAX_BITS + 1); // the next code of each length
+    this.lengths = lengths;
+    this.codes = new Uint16Array(lengths.length); // of each symbol, its first bit the lowest
     let free = 1;
     for (let length = 1; length <= MAX_BITS; length++) {
       free = 2 * free - counts[length];
@@ -57,6 +59,7 @@ class Huffman {
       if (length === 0) return;
       const entry = 16 * symbol + length;
       const first = reversed(next[length]++, length);
+      this.codes[symbol] = first;
       for (let i = first; i < this.table.length; i += 1 << length) this.table[i] = entry;
     });
   }
@@ -220,7 +223,7 @@ class Inflater {
 }
 
 /** The codes of blocks of kind 1; both are whole, so nothing is refused. */
-const FIXED_CODES = [
+export const FIXED_CODES = [
   Uint8Array.from({ length: 288 }, (_, i) => (i < 144 ? 8 : i < 256 ? 9 : i < 280 ? 7 : 8)),
   new Uint8Array(32).fill(5),
 ].map((lengths) => new Huffman(lengths, null));
@@ -240,4 +243,20 @@ export function inflate(data, size, what, past = NOTHING) {
     throw new Refused(`${what}: ${size} bytes cannot come of ${data.length} bytes of deflate`);
   }
   return new Inflater(data, size, what, past).run();
+}
+
+/**
+ * The codes of a block of kind 2, of the bits from HLIT to the last code length.
+ *
+ * @param {Uint8Array} header these bits, in whole bytes
+ * @param {string} what named in messages
+ * @returns {{codes: {lengths: Uint8Array, codes: Uint16Array}[], bits: number}} the code of literals
+ *   and lengths, that of distances, and how many bits the header has
+ * @throws {Refused} also where it does not end in its last byte
+ */
+export function readCodes(header, what) {
+  const inflater = new Inflater(header, 0, what, NOTHING);
+  const codes = inflater.codes();
+  if (inflater.at !== header.length || inflater.bitCount > 7) inflater.refuse("bytes follow codes");
+  return { codes, bits: 8 * header.length - inflater.bitCount };
 }

@@ -2,6 +2,7 @@
 
 import { ByteReader } from "./bytes.js";
 import { crc32 } from "./crc32.js";
+import { restoreStream } from "./deflate-streams.js";
 import { LimitExceeded, Refused } from "./errors.js";
 import { BINARY32, BINARY64 } from "./grids.js";
 import { halvesOf, highHalf, lowHalf } from "./int64.js";
@@ -13,6 +14,7 @@ const DATA = 3;
 const CRC = 4;
 const SIZE4 = 5;
 const SIZE8 = 6;
+const DEFLATE = 7;
 const ROWS = 8;
 const SIZE1 = 9;
 /** Bytes of the kinds that follow from other pieces. */
@@ -60,15 +62,20 @@ function integer(size, signed) {
 export function restoreArrays(source, signals, maxBytes) {
   const pieces = readPieces(source.template.data, source.detail);
   checkSpans(pieces);
-  const starts = [0];
-  for (const piece of pieces) starts.push(starts[starts.length - 1] + sizeOf(piece, signals));
-  const size = starts[pieces.length];
   const nValues = signals.reduce((sum, { nRows, nChannels }) => sum + nRows * nChannels, 0);
   const most = Math.min(maxBytes, Math.max(LEAST_LIMIT, BYTES_PER_VALUE * nValues));
-  if (size > most) throw new LimitExceeded(`a file of arrays of ${size} bytes, limit ${most}`);
-  const out = new Uint8Array(size);
-  const view = new DataView(out.buffer);
-  pieces.forEach((piece, k) => put(out, view, starts, piece, starts[k], signals));
+  const nOfFile = countFilePieces(pieces);
+  if (nOfFile < pieces.length) {
+    startsOf(pieces, signals, most);
+    for (const piece of pieces) {
+      if (piece.kind !== DEFLATE) continue;
+      const own = pieces.slice(piece.start, piece.stop);
+      const inner = startsOf(own, signals, most);
+      piece.text = restoreStream(piece.text, assemble(own, inner, signals).out);
+    }
+  }
+  const starts = startsOf(pieces, signals, most);
+  const { out, view } = assemble(pieces, starts, signals);
   const known = new Map();
   pieces.forEach(({ kind, start, stop }, k) => {
     if (kind !== CRC) return;
@@ -77,7 +84,30 @@ export function restoreArrays(source, signals, maxBytes) {
     if (!sums.has(stop)) sums.set(stop, crc32(out, starts[start], starts[stop]));
     view.setUint32(starts[k], sums.get(stop), true);
   });
-  return out;
+  return out.subarray(0, starts[nOfFile]);
+}
+
+/** The number of pieces that are the file: the others are contents of DEFLATE pieces. */
+function countFilePieces(pieces) {
+  const starts = pieces.filter(({ kind }) => kind === DEFLATE).map(({ start }) => start);
+  return starts.reduce((least, start) => Math.min(least, start), pieces.length);
+}
+
+/** The offset of each piece, and the size of all. */
+function startsOf(pieces, signals, most) {
+  const starts = [0];
+  for (const piece of pieces) starts.push(starts[starts.length - 1] + sizeOf(piece, signals));
+  const size = starts[pieces.length];
+  if (size > most) throw new LimitExceeded(`a file of arrays of ${size} bytes, limit ${most}`);
+  return starts;
+}
+
+/** The bytes of all pieces but CRC. */
+function assemble(pieces, starts, signals) {
+  const out = new Uint8Array(starts[pieces.length]);
+  const view = new DataView(out.buffer);
+  pieces.forEach((piece, k) => put(out, view, starts, piece, starts[k], signals));
+  return { out, view };
 }
 
 function readPieces(template, detail) {
@@ -93,7 +123,9 @@ function readPieces(template, detail) {
   reader.end();
   checkColumns(pieces);
   let used = 0;
-  for (const piece of pieces) if (piece.kind === OWN) piece.text = parts[used++];
+  for (const piece of pieces) {
+    if (piece.kind === OWN || piece.kind === DEFLATE) piece.text = parts[used++];
+  }
   if (used !== parts.length) own.refuse(`${parts.length} parts of ${used} pieces`);
   return pieces;
 }
@@ -122,6 +154,7 @@ function readPiece(reader, left) {
     case CRC:
     case SIZE4:
     case SIZE8:
+    case DEFLATE:
     case SIZE1:
       return { kind, start: reader.varint(), stop: reader.varint() };
     default:
@@ -152,15 +185,27 @@ function readData(reader, left) {
   return { kind: DATA, signal, type: TYPES[type], flags, runs };
 }
 
+/** Whether pieces of a kind follow from other pieces. */
+function follows(kind) {
+  return kind in SIZES || kind === DEFLATE;
+}
+
 /** Checks what pieces say of other pieces. */
 function checkSpans(pieces) {
+  const nOfFile = countFilePieces(pieces);
+  for (const { kind } of pieces.slice(nOfFile)) {
+    if (follows(kind)) throw new Refused(`arrays: a piece of kind ${kind} in contents`);
+  }
   const sums = [0]; // CRC pieces before each piece
   for (const { kind } of pieces) sums.push(sums[sums.length - 1] + (kind === CRC ? 1 : 0));
   const spans = [];
   for (const { kind, start, stop } of pieces) {
-    if (!(kind in SIZES)) continue;
+    if (!follows(kind)) continue;
     if (start > stop || stop > pieces.length) {
       throw new Refused(`arrays: pieces ${start} to ${stop} of ${pieces.length}`);
+    }
+    if (start < nOfFile && stop > nOfFile) {
+      throw new Refused(`arrays: pieces ${start} to ${stop} are not all of the file`);
     }
     if (kind !== CRC) continue;
     if (sums[start] !== sums[stop]) throw new Refused("arrays: a CRC-32 of a CRC-32");
@@ -176,7 +221,7 @@ function checkSpans(pieces) {
 
 function sizeOf(piece, signals) {
   const { kind } = piece;
-  if (kind === TEXT || kind === OWN) return piece.text.length;
+  if (kind === TEXT || kind === OWN || kind === DEFLATE) return piece.text.length;
   if (kind in SIZES) return SIZES[kind];
   const decoded = signals[piece.signal];
   if (!decoded) throw new Refused(`arrays: signal ${piece.signal} of ${signals.length}`);
@@ -194,7 +239,7 @@ function sizeOf(piece, signals) {
 /** Puts the bytes of a piece of any kind but CRC. */
 function put(out, view, starts, piece, at, signals) {
   const { kind } = piece;
-  if (kind === TEXT || kind === OWN) {
+  if (kind === TEXT || kind === OWN || kind === DEFLATE) {
     out.set(piece.text, at);
   } else if (kind === COUNT) {
     const number = String(signals[piece.signal].nRows);

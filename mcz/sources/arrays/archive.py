@@ -1,31 +1,33 @@
 """The structure of a ZIP archive: its members, and the fields that follow from them.
 
-Members are never inflated, and what their bytes are is no matter here. A ZIP says most things
-twice; where the two disagree about where a member lies, it is refused.
+Deflated members are inflated, up to a limit. A ZIP states most things twice: where the two disagree
+about the place of a member, it is refused.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from mcz.errors import SourceError
+from mcz.errors import MczError, SourceError
+from mcz.model.schema import inflate
 from mcz.sources.arrays.layout import SIZES, Kind
 
 LOCAL, CENTRAL, END = b"PK\3\4", b"PK\1\2", b"PK\5\6"
 END64, LOCATOR64, DESCRIPTOR = b"PK\6\6", b"PK\6\7", b"PK\7\x08"
-STORED = 0
+STORED, DEFLATED = 0, 8  # methods
 ENCRYPTED, DESCRIBED = 1, 8  # flags of a member
 FULL32 = 0xFFFFFFFF  # the number is in the ZIP64 field
 ZIP64 = 1  # id of that extra field
 MAX_MEMBERS = 2**16
+LEAST_LIMIT, MOST_RATIO = 2**26, 16  # contents may always have, or have for each byte of the file
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A number at offset ``at`` that says what the bytes from ``start`` to ``stop`` are."""
+    """A number at offset ``at`` that follows from the bytes from ``start`` to ``stop``."""
 
     at: int
     kind: Kind
@@ -36,7 +38,11 @@ class Field:
 @dataclass(frozen=True, slots=True)
 class Member:
     """A member: ``at`` is the offset of its local header, ``start`` and ``stop`` those of its
-    bytes; ``entry`` is that of its entry in the central directory."""
+    bytes; ``entry`` is that of its entry in the central directory.
+
+    ``contents`` are the offsets in ``Archive.data`` of its ``size`` bytes as they were before they
+    were packed; None where they are not known, for the reason ``fault``.
+    """
 
     name: str
     method: int
@@ -45,22 +51,36 @@ class Member:
     start: int
     stop: int
     entry: int
+    size: int
+    contents: tuple[int, int] | None = None
+    fault: str = ""
+
+    @property
+    def is_encrypted(self) -> bool:
+        return bool(self.flags & ENCRYPTED)
 
     @property
     def is_stored(self) -> bool:
-        return self.method == STORED and not self.flags & ENCRYPTED
+        return self.method == STORED and not self.is_encrypted
+
+    @property
+    def is_deflated(self) -> bool:
+        return self.method == DEFLATED and not self.is_encrypted
 
 
 @dataclass(frozen=True, slots=True)
 class Archive:
     """The members of a ZIP in the order of their bytes, and its fields that are true.
 
-    ``wrong``: members whose CRC-32 is another.
+    ``data`` is the file and, from ``size`` on, the contents of its deflated members. ``wrong``:
+    members whose CRC-32 is another.
     """
 
-    members: tuple[Member, ...]
-    fields: tuple[Field, ...]
-    wrong: tuple[str, ...]
+    data: bytes
+    size: int
+    members: tuple[Member, ...] = ()
+    fields: tuple[Field, ...] = ()
+    wrong: tuple[str, ...] = ()
 
 
 def _number(data: bytes, at: int, size: int) -> int:
@@ -81,24 +101,49 @@ def read_archive(data: bytes) -> Archive:
             raise SourceError(f"members {one.name!r} and {other.name!r} overlap", offset=other.at)
     if members and members[-1].stop > start:
         raise SourceError(f"member {members[-1].name!r} overlaps the directory", offset=start)
+    whole, members = _with_contents(data, members)
     parts = (*_of_members(data, members), *_of_directory(data, start, end, tail))
-    wanted = sorted(parts, key=lambda field: field.at)
+    fields = sorted(parts, key=lambda field: field.at)
     sums = {
-        (f.start, f.stop): zlib.crc32(memoryview(data)[f.start : f.stop])
-        for f in wanted
+        (f.start, f.stop): zlib.crc32(memoryview(whole)[f.start : f.stop])
+        for f in fields
         if f.kind == Kind.CRC
     }
     true, wrong, taken = [], set(), 0
-    for field in wanted:
-        size = SIZES[field.kind]
+    for field in fields:
+        width = SIZES[field.kind]
         is_sum = field.kind == Kind.CRC
-        meant = sums[field.start, field.stop] if is_sum else field.stop - field.start
-        if field.at >= taken and _number(data, field.at, size) == meant:
+        number = sums[field.start, field.stop] if is_sum else field.stop - field.start
+        if field.at >= taken and _number(data, field.at, width) == number:
             true.append(field)
-            taken = field.at + size
+            taken = field.at + width
         elif is_sum and field.at >= start:
-            wrong |= {member.name for member in members if member.start == field.start}
-    return Archive(members, tuple(true), tuple(sorted(wrong)))
+            span = field.start, field.stop
+            wrong |= {member.name for member in members if member.contents == span}
+    return Archive(whole, len(data), members, tuple(true), tuple(sorted(wrong)))
+
+
+def _with_contents(data: bytes, members: Sequence[Member]) -> tuple[bytes, tuple[Member, ...]]:
+    """The file followed by the contents of deflated members, and the members with their place."""
+    left = max(LEAST_LIMIT, MOST_RATIO * len(data))
+    parts, placed, end = [data], [], len(data)
+    for member in members:
+        if member.is_stored:
+            member = replace(member, contents=(member.start, member.stop))
+        elif member.is_deflated and member.size > left:
+            member = replace(member, fault=f"of {member.size} bytes when inflated: too many")
+        elif member.is_deflated:
+            try:
+                part = inflate(data[member.start : member.stop], member.size, member.name)
+            except MczError as error:
+                member = replace(member, fault=f"damaged: {error}")
+            else:
+                parts.append(part)
+                member = replace(member, contents=(end, end + len(part)))
+                end += len(part)
+                left -= len(part)
+        placed.append(member)
+    return b"".join(parts), tuple(placed)
 
 
 def _ends(data: bytes) -> tuple[int, int, int, int]:
@@ -143,7 +188,7 @@ def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
     start = local + 30 + _number(data, local + 26, 2) + _number(data, local + 28, 2)
     if start + packed > len(data):
         raise SourceError(f"member {name!r} of {packed} bytes runs past the end", offset=local)
-    member = Member(name, method, flags, local, start, start + packed, at)
+    member = Member(name, method, flags, local, start, start + packed, at, size)
     if member.is_stored and size != packed:
         raise SourceError(
             f"member {name!r} is stored, but {packed} bytes are said to be {size}", offset=at
@@ -219,14 +264,18 @@ def _of_members(data: bytes, members: tuple[Member, ...]) -> Iterator[Field]:
     for member in members:
         span = member.start, member.stop
         sizes = [_number(data, member.entry + k, 2) for k in (28, 30, 32)]
-        yield Field(member.at + 14, Kind.CRC, *span)
-        yield Field(member.entry + 16, Kind.CRC, *span)
-        size, packed, place = _wide_fields(data, member.entry, sizes)
-        for _, at, width in (*_local_sizes(data, member), size, packed):
-            yield Field(at, _of_width(width), *span)
+        entry_fields = _wide_fields(data, member.entry, sizes)
+        place = entry_fields.pop()
+        for pair in (_local_sizes(data, member), entry_fields):
+            for (_, at, width), of in zip(pair, (member.contents, span), strict=True):
+                if of is not None:
+                    yield Field(at, _of_width(width), *of)
+        if member.contents is not None:
+            yield Field(member.at + 14, Kind.CRC, *member.contents)
+            yield Field(member.entry + 16, Kind.CRC, *member.contents)
         yield Field(place[1], _of_width(place[2]), 0, member.at)
-        if member.flags & DESCRIBED:
-            yield from _descriptor(data, member)
+        if member.flags & DESCRIBED and member.contents is not None:
+            yield from _descriptor(data, member, member.contents)
 
 
 def _of_directory(data: bytes, start: int, end: int, tail: int) -> Iterator[Field]:
@@ -239,16 +288,15 @@ def _of_directory(data: bytes, start: int, end: int, tail: int) -> Iterator[Fiel
         yield Field(tail - 12, Kind.SIZE8, 0, end)
 
 
-def _descriptor(data: bytes, member: Member) -> Iterator[Field]:
+def _descriptor(data: bytes, member: Member, contents: tuple[int, int]) -> Iterator[Field]:
     """The fields of what may follow the bytes of a member."""
-    span, at = (member.start, member.stop), member.stop
-    at += 4 if data[at : at + 4] == DESCRIPTOR else 0
-    yield Field(at, Kind.CRC, *span)
-    size = member.stop - member.start
-    wide = _number(data, at + 4, 8) == size and _number(data, at + 12, 8) == size
+    at = member.stop + (4 if data[member.stop : member.stop + 4] == DESCRIPTOR else 0)
+    packed = member.stop - member.start
+    wide = _number(data, at + 4, 8) == packed and _number(data, at + 12, 8) == member.size
     width = 8 if wide else 4
-    yield Field(at + 4, _of_width(width), *span)
-    yield Field(at + 4 + width, _of_width(width), *span)
+    yield Field(at, Kind.CRC, *contents)
+    yield Field(at + 4, _of_width(width), member.start, member.stop)
+    yield Field(at + 4 + width, _of_width(width), *contents)
 
 
 def _of_width(width: int) -> Kind:

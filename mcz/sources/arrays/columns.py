@@ -169,8 +169,6 @@ def _ordinals(part: Columns) -> NDArray[np.int64]:
 
 LARGE = 1024  # bytes of an array: that a larger one is kept is said
 MAX_TEXT = 2**16  # bytes of an array of text that are looked at
-DEFLATED = "deflated, which differs between builds"
-STAYS = "and stays so, since deflate differs between builds (numpy.savez stores)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,19 +216,21 @@ def npy_array(data: bytes) -> Array:
 def npz_arrays(data: bytes) -> tuple[list[Array], Archive]:
     """The arrays of an NPZ file in the order of their bytes, one for each member."""
     archive = read_archive(data)
-    return [_member(data, member) for member in archive.members], archive
+    return [_member(archive.data, member) for member in archive.members], archive
 
 
 def _member(data: bytes, member: Member) -> Array:
+    """The array in a member; ``data`` is that of its archive."""
     name = member.name.removesuffix(".npy")
-    if not member.is_stored:
-        how = "deflated" if member.method == 8 else f"packed by method {member.method}"
-        how = "encrypted" if member.flags & 1 else f"{how}, {STAYS}"
+    if member.contents is None:
+        how = f"deflated, {member.fault}" if member.fault else f"packed by method {member.method}"
+        how = "encrypted" if member.is_encrypted else how
         return Array(name, Head(), kept=how, is_loud=True)
-    head = read_head(data, member.start, member.stop)
+    start, stop = member.contents
+    head = read_head(data, start, stop)
     if head.odd:
         return Array(name, Head(), kept=f"no array ({head.odd})", is_loud=name != member.name)
-    return array_of(name, data, head, member.stop)
+    return array_of(name, data, head, stop)
 
 
 def array_of(name: str, data: bytes, head: Head, stop: int) -> Array:

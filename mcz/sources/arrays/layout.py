@@ -5,7 +5,7 @@ SPEC.md, "Template of arrays", is normative and has the tables.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import accumulate, pairwise
@@ -35,13 +35,16 @@ class Kind(IntEnum):
     CRC = 4  # CRC-32 of other pieces
     SIZE4 = 5  # how many bytes other pieces have, u32
     SIZE8 = 6  # the same, u64
+    DEFLATE = 7  # the deflate stream of other pieces
     ROWS = 8  # the number of rows, an integer
     SIZE1 = 9  # how many bytes other pieces have, u8
 
 
 SIZES = {Kind.SIZE1: 1, Kind.CRC: 4, Kind.SIZE4: 4, Kind.SIZE8: 8}  # bytes of these kinds
+OF_PIECES = (*SIZES, Kind.DEFLATE)
 _OF_ROWS = (Kind.COUNT, Kind.DATA, Kind.ROWS)
-_OF_PIECES = tuple(SIZES)
+_OF_DETAIL = (Kind.OWN, Kind.DEFLATE)
+_OF_CONTENTS = (Kind.TEXT, Kind.OWN, *_OF_ROWS)
 
 
 def _if(kinds: Sequence[Kind], item: object) -> IfThenElse:
@@ -81,9 +84,9 @@ class ArrayPiece(Record):
     runs: list[ArrayRun] | None = field(
         _if((Kind.DATA,), counted(ArrayRun, kind="runs")), "DATA only: its columns, in order"
     )
-    start: int | None = field(_if(_OF_PIECES, UVARINT), "CRC and SIZE only: first piece")
+    start: int | None = field(_if(OF_PIECES, UVARINT), "CRC, SIZE and DEFLATE only: first piece")
     stop: int | None = field(
-        _if(_OF_PIECES, UVARINT), "CRC and SIZE only: the piece behind the last"
+        _if(OF_PIECES, UVARINT), "CRC, SIZE and DEFLATE only: the piece after the last"
     )
 
 
@@ -98,7 +101,9 @@ class ArrayTemplate(Record):
 class ArrayDetail(Record):
     """Detail of arrays."""
 
-    parts: list[bytes] = field(counted(SIZED, MAX_PIECES), "bytes of the OWN pieces, in order")
+    parts: list[bytes] = field(
+        counted(SIZED, MAX_PIECES), "an entry for each OWN and DEFLATE piece, in order"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +111,7 @@ class Piece:
     """A piece of a file; what does not go with its kind is empty. See ArrayPiece."""
 
     kind: Kind
-    text: bytes = b""  # of OWN pieces, too
+    text: bytes = b""  # of OWN pieces, too; of a DEFLATE piece its part of the detail
     signal: int = 0
     after: bytes = b""
     size: int = 0
@@ -149,7 +154,7 @@ def build_arrays(pieces: Sequence[Piece]) -> tuple[bytes, bytes]:
         )
         for piece in pieces
     ]
-    parts = [piece.text for piece in pieces if piece.kind == Kind.OWN]
+    parts = [piece.text for piece in pieces if piece.kind in _OF_DETAIL]
     return (
         build(ArrayTemplate(pieces=fields), "source template"),
         build(ArrayDetail(parts=parts), "source detail"),
@@ -161,14 +166,14 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
     limits = {"runs": MAX_RUNS}  # ARRAY-17
     fields = parse(ArrayTemplate, template, "source template", limits).pieces
     parts = list(parse(ArrayDetail, detail, "source detail").parts)
-    wanted = sum(row.kind == Kind.OWN for row in fields)
-    if wanted != len(parts):  # ARRAY-05
-        raise FormatError(f"source detail: {len(parts)} parts, but {wanted} pieces are its own")
+    n_parts = sum(row.kind in _OF_DETAIL for row in fields)
+    if n_parts != len(parts):  # ARRAY-05
+        raise FormatError(f"source detail: {len(parts)} parts, but {n_parts} pieces have one")
     own = iter(parts)
     return tuple(
         Piece(
             Kind(row.kind),
-            next(own) if row.kind == Kind.OWN else row.text or b"",
+            next(own) if row.kind in _OF_DETAIL else row.text or b"",
             row.signal or 0,
             row.after or b"",
             row.size or 0,
@@ -182,16 +187,29 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
     )
 
 
+def n_file_pieces(pieces: Sequence[Piece]) -> int:
+    """The number of pieces that are the file; the others are the contents of DEFLATE pieces."""
+    return min((p.start for p in pieces if p.kind == Kind.DEFLATE), default=len(pieces))
+
+
 def check_spans(pieces: Sequence[Piece]) -> None:
-    """Raise FormatError where pieces speak of others that there are not, or of themselves."""
+    """Raise FormatError where pieces refer to others that do not exist, or to themselves."""
+    n_file = n_file_pieces(pieces)
+    for index, piece in enumerate(pieces[n_file:], n_file):
+        if piece.kind not in _OF_CONTENTS:  # ARRAY-18
+            raise FormatError(f"source template: piece {index} of kind {piece.kind} in contents")
     spans = set()
     checks = [0, *accumulate(piece.kind == Kind.CRC for piece in pieces)]
     for piece in pieces:
-        if piece.kind not in _OF_PIECES:
+        if piece.kind not in OF_PIECES:
             continue
         if not piece.start <= piece.stop <= len(pieces):  # ARRAY-06
             raise FormatError(
                 f"source template: pieces {piece.start} to {piece.stop} of {len(pieces)}"
+            )
+        if piece.start < n_file < piece.stop:  # ARRAY-19
+            raise FormatError(
+                f"source template: pieces {piece.start} to {piece.stop}, of the file and contents"
             )
         if piece.kind == Kind.CRC:
             if checks[piece.start] != checks[piece.stop]:  # ARRAY-07
@@ -220,16 +238,27 @@ def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
 
 
 def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
-    """The members of an NPZ: the name of each array, and its pieces from its header on."""
+    """The members of an NPZ: the name of each array, and its pieces from its header on.
+
+    Those of a deflated member are followed by the pieces of its contents.
+    """
+    n_file = n_file_pieces(pieces)
     starts = [
         index
-        for index, piece in enumerate(pieces)
+        for index, piece in enumerate(pieces[:n_file])
         if piece.kind == Kind.TEXT and piece.text.startswith(LOCAL)
     ]
     return [
-        (_name(pieces[start:]), pieces[start:stop])
-        for start, stop in pairwise((*starts, len(pieces)))
+        (_name(pieces[start:]), (*own, *_contents(pieces, own)))
+        for start, stop in pairwise((*starts, n_file))
+        for own in (pieces[start:stop],)
     ]
+
+
+def _contents(pieces: Sequence[Piece], own: Sequence[Piece]) -> Iterator[Piece]:
+    for piece in own:
+        if piece.kind == Kind.DEFLATE:
+            yield from pieces[piece.start : piece.stop]
 
 
 def list_pieces(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> JsonObject:

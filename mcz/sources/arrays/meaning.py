@@ -17,7 +17,7 @@ from mcz.errors import SourceError
 from mcz.model.clock import times_fault
 from mcz.model.motion import Channel, Joint, Skeleton
 from mcz.model.types import Items
-from mcz.sources.arrays.columns import DEFLATED, STAYS, Array
+from mcz.sources.arrays.columns import Array
 from mcz.sources.arrays.robot_arrays import (
     BODIES,
     BODY_NAMES,
@@ -118,9 +118,6 @@ def _frames_of(arrays: Sequence[Array]) -> int:
 
 def _reasons(arrays: Sequence[Array]) -> list[str]:
     """Reasons why the first arrays are no motion."""
-    if len(arrays) > 1 and all(STAYS in array.kept for array in arrays):
-        again = "numpy.savez(path, **numpy.load(other)) stores it anew"
-        return [f"all of its {len(arrays)} members are {DEFLATED}: {again}"]
     shown = arrays[:4]
     reasons = [f"{a.name!r} is {a.kept or f'of shape {a.head.shape}'}" for a in shown]
     return [*reasons, "..."] if len(arrays) > len(shown) else reasons

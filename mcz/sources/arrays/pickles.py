@@ -87,7 +87,7 @@ def read_pickle(data: bytes, at: int = 0) -> Pickle:
     rest = len(data) - machine.at
     notes = (f"{rest} bytes follow the pickle",) if rest else ()
     fields.sort(key=lambda field: field.at)
-    return Pickle(arrays, Archive((), tuple(fields), ()), clip, notes)
+    return Pickle(arrays, Archive(data, len(data), fields=tuple(fields)), clip, notes)
 
 
 def _children(machine: Machine, node: object) -> list[tuple[str, object]]:

@@ -14,13 +14,13 @@ from mcz.errors import MotionError, SourceError
 from mcz.model.motion import Motion, Signal, Source
 from mcz.sources.arrays.archive import Archive
 from mcz.sources.arrays.columns import Array, columns_of, npy_array, npz_arrays, signal_of
-from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Piece, build_arrays
+from mcz.sources.arrays.deflate import is_kept
+from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Kind, Piece, build_arrays
 from mcz.sources.arrays.meaning import Meaning, meaning_of
 from mcz.sources.arrays.pickles import Pickle, npy_objects, read_pickle
 from mcz.sources.arrays.restore import Placed, pieces_of, restore_arrays
 
 CLIP = "x-clip"  # the key of the only clip in a pickle
-NO_ARCHIVE = Archive((), (), ())
 
 
 def read_npy(data: bytes, name: str = "motion") -> Motion:
@@ -31,8 +31,8 @@ def read_npy(data: bytes, name: str = "motion") -> Motion:
     """
     pickle = npy_objects(data)
     if pickle is not None:
-        return _pickled("npy", data, name, pickle)
-    return _motion("npy", data, name, [npy_array(data)], NO_ARCHIVE)
+        return _pickled("npy", name, pickle)
+    return _motion("npy", name, [npy_array(data)], Archive(data, len(data)))
 
 
 def read_pickle_file(data: bytes, name: str = "motion") -> Motion:
@@ -40,11 +40,11 @@ def read_pickle_file(data: bytes, name: str = "motion") -> Motion:
 
     Raises SourceError, with the offset at fault, for one that has anything else than data.
     """
-    return _pickled("pickle", data, name, read_pickle(data))
+    return _pickled("pickle", name, read_pickle(data))
 
 
-def _pickled(format_name: str, data: bytes, name: str, pickle: Pickle) -> Motion:
-    motion = _motion(format_name, data, name, pickle.arrays, pickle.archive, pickle.notes)
+def _pickled(format_name: str, name: str, pickle: Pickle) -> Motion:
+    motion = _motion(format_name, name, pickle.arrays, pickle.archive, pickle.notes)
     clip = {CLIP: pickle.clip} if pickle.clip else {}
     return replace(motion, metadata=clip | dict(motion.metadata))
 
@@ -52,15 +52,14 @@ def _pickled(format_name: str, data: bytes, name: str, pickle: Pickle) -> Motion
 def read_npz(data: bytes, name: str = "motion") -> Motion:
     """The motion in an NPZ file; ``name`` becomes its name.
 
-    Members that are deflated, pickled or no arrays are kept as their bytes. Raises SourceError,
-    with the offset at fault or the reason why it is no motion.
+    Members that are pickled or no arrays are kept as their bytes. Raises SourceError, with the
+    offset at fault or the reason why it is no motion.
     """
-    return _motion("npz", data, name, *npz_arrays(data))
+    return _motion("npz", name, *npz_arrays(data))
 
 
 def _motion(
     format_name: str,
-    data: bytes,
     name: str,
     arrays: Sequence[Array],
     archive: Archive,
@@ -68,7 +67,7 @@ def _motion(
 ) -> Motion:
     meaning = meaning_of(arrays)
     meaning.notes += notes
-    pieces = _pieces(data, arrays, archive, meaning)
+    pieces = _pieces(arrays, archive, meaning)
     n_runs = sum(len(piece.runs) for piece in pieces)
     if len(pieces) > MAX_PIECES or n_runs > MAX_RUNS:
         raise SourceError(
@@ -76,15 +75,15 @@ def _motion(
             f"many: {MAX_PIECES} pieces and {MAX_RUNS} runs at most"
         )
     template, detail = build_arrays(pieces)
-    digest = hashlib.sha256(data).digest()
+    digest = hashlib.sha256(memoryview(archive.data)[: archive.size]).digest()
     return Motion(
         meaning.skeleton,
         tuple(_signals(meaning)),
         meaning.rate,
         meaning.rate_is_exact,
         name,
-        _metadata(arrays, archive, meaning),
-        Source(format_name, template, detail, size=len(data), sha256=digest),
+        _metadata(arrays, archive, meaning, pieces),
+        Source(format_name, template, detail, size=archive.size, sha256=digest),
     )
 
 
@@ -101,22 +100,28 @@ def _signals(meaning: Meaning) -> list[Signal]:
     ]
 
 
-def _pieces(
-    data: bytes, arrays: Sequence[Array], archive: Archive, meaning: Meaning
-) -> list[Piece]:
+def _pieces(arrays: Sequence[Array], archive: Archive, meaning: Meaning) -> list[Piece]:
     placed = [Placed(arrays[k].head, *place) for k, place in sorted(meaning.places.items())]
     kept = [
         (array.head.start, array.stop)
         for k, array in enumerate(arrays)
         if k not in meaning.places and array.stop > array.head.start
     ]
-    return pieces_of(data, placed, archive, kept)
+    return pieces_of(archive, placed, kept)
 
 
-def _metadata(arrays: Sequence[Array], archive: Archive, meaning: Meaning) -> dict[str, str]:
+def _metadata(
+    arrays: Sequence[Array], archive: Archive, meaning: Meaning, pieces: Sequence[Piece]
+) -> dict[str, str]:
     """Metadata of the file: its words, and notes on oddities."""
     notes = [f"{array.name} is {array.kept}" for array in arrays if array.is_loud]
     notes += [f"the CRC-32 of {name} is not that of its bytes" for name in archive.wrong]
+    kept = [piece for piece in pieces if piece.kind == Kind.DEFLATE and is_kept(piece.text)]
+    if kept:
+        size = sum(len(piece.text) for piece in kept)
+        notes.append(
+            f"another compressor than zlib deflated {len(kept)} members: {size} bytes are kept"
+        )
     notes += meaning.notes
     return meaning.metadata | ({"source-note": "; ".join(notes)} if notes else {})
 

@@ -19,17 +19,20 @@ from mcz.errors import FormatError, LimitError
 from mcz.model.motion import Motion, Signal
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Items
-from mcz.sources.arrays.archive import Archive
+from mcz.sources.arrays.archive import Archive, Member
 from mcz.sources.arrays.columns import file_columns
+from mcz.sources.arrays.deflate import describe_stream, restore_stream
 from mcz.sources.arrays.header import Head
 from mcz.sources.arrays.layout import (
     BIG_ENDIAN,
     BY_COLUMNS,
+    OF_PIECES,
     SIZES,
     TYPES,
     Kind,
     Piece,
     check_spans,
+    n_file_pieces,
     parse_arrays,
 )
 
@@ -49,21 +52,18 @@ def restore_arrays(motion: Motion) -> bytes:
     """
     source = motion.source
     assert source is not None
-    pieces = parse_arrays(source.template, source.detail)
-    check_spans(pieces)
+    parsed = parse_arrays(source.template, source.detail)
+    check_spans(parsed)
     signals = [signal.as_stored() for signal in motion.signals]
-    sizes = [_size(piece, signals) for piece in pieces]
-    starts = [0, *accumulate(sizes)]
-    most = max(SIZE_LIMIT, SIZE_PER_VALUE * sum(signal.values.size for signal in signals))
-    if starts[-1] > most:
-        raise LimitError(f"source template: a file of {starts[-1]} bytes, limit {most}")
-    n_columns = sum(piece.n_columns for piece in pieces)
+    n_columns = sum(piece.n_columns for piece in parsed)
     if n_columns > MAX_COLUMNS:
         raise LimitError(f"source template: {n_columns} columns, limit {MAX_COLUMNS}")
+    pieces = _deflated(parsed, signals)
+    starts = _starts(pieces, signals)
     out = bytearray(starts[-1])
-    for piece, at, size in zip(pieces, starts, sizes, strict=False):
+    for piece, at, stop in zip(pieces, starts, starts[1:], strict=False):
         if piece.kind != Kind.CRC:
-            out[at : at + size] = _bytes(piece, signals, starts)
+            out[at:stop] = _bytes(piece, signals, starts)
     known: dict[tuple[int, int], bytes] = {}
     for piece, at in zip(pieces, starts, strict=False):
         if piece.kind == Kind.CRC:  # ARRAY-15
@@ -71,13 +71,39 @@ def restore_arrays(motion: Motion) -> bytes:
             if span not in known:
                 known[span] = zlib.crc32(memoryview(out)[slice(*span)]).to_bytes(4, "little")
             out[at : at + 4] = known[span]
-    return bytes(out)
+    return bytes(memoryview(out)[: starts[n_file_pieces(pieces)]])
+
+
+def _starts(pieces: Sequence[Piece], signals: Sequence[Signal]) -> list[int]:
+    """The offset of each piece, and the size of all; raises LimitError for too large a one."""
+    starts = [0, *accumulate(_size(piece, signals) for piece in pieces)]
+    most = max(SIZE_LIMIT, SIZE_PER_VALUE * sum(signal.values.size for signal in signals))
+    if starts[-1] > most:
+        raise LimitError(f"source template: a file of {starts[-1]} bytes, limit {most}")
+    return starts
+
+
+def _deflated(pieces: Sequence[Piece], signals: Sequence[Signal]) -> Sequence[Piece]:
+    """``pieces`` with the stream itself as the text of each DEFLATE piece."""
+    if n_file_pieces(pieces) == len(pieces):
+        return pieces
+    _starts(pieces, signals)
+    return [
+        replace(piece, text=restore_stream(piece.text, _contents(piece, pieces, signals)))
+        if piece.kind == Kind.DEFLATE
+        else piece
+        for piece in pieces
+    ]
+
+
+def _contents(piece: Piece, pieces: Sequence[Piece], signals: Sequence[Signal]) -> bytes:
+    return b"".join(_bytes(part, signals, ()) for part in pieces[piece.start : piece.stop])
 
 
 def _size(piece: Piece, signals: Sequence[Signal]) -> int:
     """The bytes of a piece; raises FormatError where it does not fit the signals."""
     match piece.kind:
-        case Kind.TEXT | Kind.OWN:
+        case Kind.TEXT | Kind.OWN | Kind.DEFLATE:
             return len(piece.text)
         case Kind.COUNT | Kind.ROWS:
             _signal(piece, signals)
@@ -193,10 +219,11 @@ class Placed:
 
 
 def pieces_of(
-    data: bytes, placed: Sequence[Placed], archive: Archive, kept: Sequence[tuple[int, int]]
+    archive: Archive, placed: Sequence[Placed], kept: Sequence[tuple[int, int]]
 ) -> list[Piece]:
     """The pieces of a file; ``kept`` are the spans of numbers that are in no signal."""
-    spans: list[tuple[int, int, Piece]] = []
+    data = archive.data
+    spans = [_of_stream(data, member) for member in archive.members if _is_restored(member)]
     for array in placed:
         spans += _of_array(data, array)
     for start, stop in kept:
@@ -206,14 +233,27 @@ def pieces_of(
         piece = Piece(field.kind, start=field.start, stop=field.stop)
         spans.append((field.at, field.at + SIZES[field.kind], piece))
     spans.sort(key=lambda span: span[:2])
-    cuts = {0, len(data), *(cut for field in archive.fields for cut in (field.start, field.stop))}
+    referring = [piece for _, _, piece in spans if piece.kind in OF_PIECES]
+    cuts = {0, archive.size, len(data), *(cut for p in referring for cut in (p.start, p.stop))}
     starts, pieces = _cut_pieces(data, spans, sorted(cuts))
     return [
         replace(piece, start=bisect_left(starts, piece.start), stop=bisect_left(starts, piece.stop))
-        if piece.kind in SIZES
+        if piece.kind in OF_PIECES
         else piece
         for piece in pieces
     ]
+
+
+def _is_restored(member: Member) -> bool:
+    """Return True if the stream of a member is restored from its contents."""
+    return member.is_deflated and member.contents is not None and member.size > 0
+
+
+def _of_stream(data: bytes, member: Member) -> tuple[int, int, Piece]:
+    assert member.contents is not None
+    start, stop = member.contents
+    part = describe_stream(data[member.start : member.stop], data[start:stop])
+    return member.start, member.stop, Piece(Kind.DEFLATE, part, start=start, stop=stop)
 
 
 def _cut_pieces(
