@@ -13,6 +13,7 @@ import sys
 import tempfile
 import threading
 import time
+import zlib
 from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import replace
@@ -29,6 +30,7 @@ from mcz.codecs.coding.forms import BINARY32
 from mcz.codecs.coding.forms.counts import Law
 from mcz.codecs.coding.forms.products import DEGREE, of_products
 from mcz.model.numbers import Grid, GridKind
+from mcz.sources.arrays.deflate import describe_stream, restore_stream
 from mcz.sources.sample import bvh_walk
 from mcz.sources.text import bvh
 from tests.codecs.lossy import encode_file, markers, rough
@@ -191,6 +193,13 @@ def stream_frames() -> None:
             pass
 
 
+def deflate_streams() -> None:
+    """A stream of zlib, taken apart and joined."""
+    contents = bytes(k * k % 251 for k in range(3000)) * 2
+    stream = zlib.compress(contents)[2:-4]
+    assert restore_stream(describe_stream(stream, contents), contents) == stream
+
+
 def edit_files(folder: Path) -> None:
     """A text file to the byte, joints of a clip, and a damaged file that is repaired."""
     (folder / "texts").mkdir()
@@ -221,6 +230,7 @@ def main() -> None:
     print_numbers()
     encode_walk()
     stream_frames()
+    deflate_streams()
     with tempfile.TemporaryDirectory() as folder:
         edit_files(Path(folder))
     print(json.dumps([compared, differences]))

@@ -1,11 +1,12 @@
 """AMCs as NPZ files like those of AMASS: rotation vectors of SMPL-H, positions, betas, a rate.
 
-    python tools/amass_like.py FOLDER_OF_AMC OUT [--float32] [--clean]
+    python tools/amass_like.py FOLDER_OF_AMC OUT [--float32] [--clean] [--compressed]
 
 AMASS itself may not be passed on, so what is measured on such files is measured on these. Turns
 and positions are those of the AMC, through SciPy; hands have none, and are 0. Members, their order,
 names and types are those of AMASS, as ``numpy.savez`` writes them. A joint that turns about one
-axis has rounding errors of some 1e-16 about the others; with --clean they are 0.
+axis has rounding errors of some 1e-16 about the others; with --clean they are 0. --compressed
+files are those of ``numpy.savez_compressed``.
 """
 
 from __future__ import annotations
@@ -77,13 +78,15 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--float32", action="store_true")
     parser.add_argument("--clean", action="store_true")
+    parser.add_argument("--compressed", action="store_true")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", mcz.SkeletonWarning)
         for path in sorted(args.amcs.glob("*.amc")):
             arrays = amass_like(path, "f4" if args.float32 else "f8", args.clean)
-            np.savez(args.out / f"{path.stem}_poses.npz", **arrays)
+            save = np.savez_compressed if args.compressed else np.savez
+            save(args.out / f"{path.stem}_poses.npz", **arrays)
 
 
 if __name__ == "__main__":

@@ -190,7 +190,7 @@ def test_frames_of_a_file_are_a_file_that_numpy_loads(order: Any) -> None:
         assert arrays["who"] == "A"
 
 
-def test_nothing_is_unpickled_nor_inflated(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_unpickled() -> None:
     class Bomb:
         def __reduce__(self) -> Any:
             return pytest.fail, ("unpickled",)
@@ -204,11 +204,6 @@ def test_nothing_is_unpickled_nor_inflated(monkeypatch: pytest.MonkeyPatch) -> N
     assert motion.metadata["source-note"] == "evil is pickled, and not unpickled"
     with pytest.raises(SourceError, match="_Fail.*is never called"):
         FORMATS["npy"].read(evil)
-    monkeypatch.setattr("zlib.decompressobj", lambda *given: pytest.fail("inflated"))
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, a=floats(3, 2))
-    with pytest.raises(SourceError, match="'a' is deflated.*numpy.savez stores"):
-        FORMATS["npz"].read(buffer.getvalue())
 
 
 def _replace_number(data: bytes, at: int, format_: str, number: int) -> bytes:
@@ -469,11 +464,6 @@ def test_files_without_a_motion_are_refused_with_the_reason() -> None:
         FORMATS["npz"].read(save_npz(betas=floats(16)))
     with pytest.raises(SourceError, match="no array"):
         FORMATS["npz"].read(npz(()))
-    deflated = io.BytesIO()
-    np.savez_compressed(deflated, poses=floats(9, 72), trans=floats(9, 3))
-    again = r"all of its 2 members are deflated, .*: numpy.savez\(path, "
-    with pytest.raises(SourceError, match=again):
-        FORMATS["npz"].read(deflated.getvalue())
     assert likely_formats(npy(floats(2, 2))) == ("npy",)
     assert likely_formats(save_npz(a=floats(2, 2))) == ("npz",)
 
@@ -516,7 +506,7 @@ def test_commands_say_what_is_read_and_what_is_kept(
     ]
     Path(path).write_bytes(npz([*members, deflated]))
     assert run("encode", path, "--arrays", "positions", "--unit", "cm") == 0
-    assert "old is deflated, and stays so" in capsys.readouterr().err
+    assert "old is no array (inflated, offset 0: no NPY file" in capsys.readouterr().err
     assert run("decode", held, "-o", again) == 0
     assert Path(again).read_bytes() == Path(path).read_bytes()
     capsys.readouterr()

@@ -229,7 +229,10 @@ def _member(data: bytes, member: Member) -> Array:
     start, stop = member.contents
     head = read_head(data, start, stop)
     if head.odd:
-        return Array(name, Head(), kept=f"no array ({head.odd})", is_loud=name != member.name)
+        odd = head.odd
+        if member.is_deflated:  # offsets count from the beginning of the contents
+            odd = f"inflated, {read_head(data[start:stop], 0, stop - start).odd}"
+        return Array(name, Head(), kept=f"no array ({odd})", is_loud=name != member.name)
     return array_of(name, data, head, stop)
 
 

@@ -119,9 +119,7 @@ def _metadata(
     kept = [piece for piece in pieces if piece.kind == Kind.DEFLATE and is_kept(piece.text)]
     if kept:
         size = sum(len(piece.text) for piece in kept)
-        notes.append(
-            f"another compressor than zlib deflated {len(kept)} members: {size} bytes are kept"
-        )
+        notes.append(f"{size} bytes of deflate, not zlib's, are kept as they are")
     notes += meaning.notes
     return meaning.metadata | ({"source-note": "; ".join(notes)} if notes else {})
 

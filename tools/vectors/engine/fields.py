@@ -27,7 +27,7 @@ from mcz.model.schema import (
     read_varint,
     varint,
 )
-from mcz.sources.arrays.layout import ArrayTemplate
+from mcz.sources.arrays.layout import ArrayDetail, ArrayTemplate
 from mcz.sources.c3d.layout import C3dDetail, C3dOutputsTemplate, C3dTemplate
 from mcz.sources.tables.layout import TableDetail, TableTemplate
 from mcz.sources.text import notes
@@ -127,6 +127,7 @@ VIEWS: dict[str, View] = {
     "DETAIL": View(b"CLIP", Detail, *_inside(payloads.Clip, "source.0.detail")),
     "OUTPUTSTEMPLATE": View(b"SRCE", C3dOutputsTemplate, _content, _with_content),
     "ARRAYTEMPLATE": View(b"SRCE", ArrayTemplate, _content, _with_content),
+    "ARRAYDETAIL": View(b"CLIP", ArrayDetail, *_inside(payloads.Clip, "source.0.detail")),
     "TABLETEMPLATE": View(b"SRCE", TableTemplate, _content, _with_content),
     "TABLEDETAIL": View(b"CLIP", TableDetail, *_inside(payloads.Clip, "source.0.detail")),
     "C3DDETAIL": View(b"CLIP", C3dDetail, *_inside(payloads.Clip, "source.0.detail")),
