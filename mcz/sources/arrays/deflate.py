@@ -16,17 +16,28 @@ from numpy.typing import NDArray
 from mcz.errors import FormatError
 from mcz.model.schema import SIZED, UVARINT, Record, build, counted, field, one_of, parse
 from mcz.sources.arrays import deflate_kernels as loops
+from mcz.sources.arrays.deflate_codes import (
+    DYNAMIC,
+    FIXED,
+    MOST_BITS,
+    N_DISTANCES,
+    N_LITERALS,
+    SPARE,
+    STORED,
+    Codes,
+)
+from mcz.sources.arrays.deflate_search import WINDOW, Effort, Search
 
 LEVELS = {  # parameters of zlib's search, by its levels
-    1: loops.Effort(4, 4, 8, 4, 1),
-    2: loops.Effort(4, 5, 16, 8, 1),
-    3: loops.Effort(4, 6, 32, 32, 1),
-    4: loops.Effort(4, 4, 16, 16, 0),
-    5: loops.Effort(8, 16, 32, 32, 0),
-    6: loops.Effort(8, 16, 128, 128, 0),
-    7: loops.Effort(8, 32, 128, 256, 0),
-    8: loops.Effort(32, 128, 258, 1024, 0),
-    9: loops.Effort(32, 258, 258, 4096, 0),
+    1: Effort(4, 4, 8, 4, 1),
+    2: Effort(4, 5, 16, 8, 1),
+    3: Effort(4, 6, 32, 32, 1),
+    4: Effort(4, 4, 16, 16, 0),
+    5: Effort(8, 16, 32, 32, 0),
+    6: Effort(8, 16, 128, 128, 0),
+    7: Effort(8, 32, 128, 256, 0),
+    8: Effort(32, 128, 258, 1024, 0),
+    9: Effort(32, 258, 258, 4096, 0),
 }
 NO_SEARCH = 0  # in place of a level: the stream is kept
 ATTEMPTS = (6, 9, 1, 5, 4, 7, 8, 3, 2)  # levels that are tried, the usual first
@@ -47,7 +58,7 @@ class DeflateBlock(Record):
     """A block of a deflate stream."""
 
     kind: int = field(
-        one_of(Int8ul, (loops.STORED, loops.FIXED, loops.DYNAMIC)), "BTYPE of RFC 1951: 0, 1 or 2"
+        one_of(Int8ul, (STORED, FIXED, DYNAMIC)), "BTYPE of RFC 1951: 0, 1 or 2"
     )  # ARRAY-20
     size: int = field(UVARINT, "bytes if kind is 0, else tokens without the end of the block")
     codes: bytes = field(SIZED, "bits from HLIT to the last code length; empty unless kind is 2")
@@ -120,7 +131,7 @@ def _check(described: Deflated) -> None:
     if items if is_kept else described.stream or not described.blocks:
         raise FormatError(f"source detail: a stream or blocks do not fit level {described.level}")
     for block in described.blocks:
-        if block.codes and block.kind != loops.DYNAMIC:
+        if block.codes and block.kind != DYNAMIC:
             raise FormatError(f"source detail: codes of a block of kind {block.kind}")
 
 
@@ -150,7 +161,7 @@ def _split(
                 kind=kind,
                 size=size,
                 codes=np.packbits(bits[start:stop], bitorder="little").tobytes()
-                if kind == loops.DYNAMIC
+                if kind == DYNAMIC
                 else b"",
             )
             for kind, size, start, stop in blocks[:n_blocks].tolist()
@@ -174,7 +185,7 @@ def _join(described: Deflated, contents: bytes) -> bytes:
         [(c.skip, c.length, c.distance) for c in described.corrections], np.uint64
     ).reshape(-1, 3)
     corrections = np.minimum(tokens, 2**62).astype(np.int64)
-    size = MOST_PER_BYTE * len(contents) + len(codes) + 8 * len(blocks) + loops.SPARE
+    size = MOST_PER_BYTE * len(contents) + len(codes) + 8 * len(blocks) + SPARE
     out = np.zeros(size, np.uint8)
     work = _work(contents, described.level)
     written = loops.join_stream(*work, blocks, _padded(codes), corrections, out)
@@ -184,20 +195,20 @@ def _join(described: Deflated, contents: bytes) -> bytes:
 
 
 def _padded(data: bytes) -> NDArray[np.uint8]:
-    return np.frombuffer(data + bytes(loops.SPARE), np.uint8)
+    return np.frombuffer(data + bytes(SPARE), np.uint8)
 
 
-def _work(contents: bytes, level: int) -> tuple[loops.Search, loops.Codes]:
+def _work(contents: bytes, level: int) -> tuple[Search, Codes]:
     """The work space of a search of ``level``."""
-    latest, earlier = np.zeros((2, loops.WINDOW), np.int64)
-    search = loops.Search(
+    latest, earlier = np.zeros((2, WINDOW), np.int64)
+    search = Search(
         np.frombuffer(contents, np.uint8), latest, earlier, np.zeros(4, np.int64), LEVELS[level]
     )
-    n_symbols = loops.N_LITERALS + loops.N_DISTANCES
+    n_symbols = N_LITERALS + N_DISTANCES
     lengths, bits = np.zeros((2, n_symbols), np.int64)
-    codes = loops.Codes(
+    codes = Codes(
         lengths,
-        np.zeros((2, loops.MOST_BITS + 1), np.int64),
+        np.zeros((2, MOST_BITS + 1), np.int64),
         np.zeros((2, n_symbols), np.int64),
         bits,
         np.array(CODE_ORDER, np.int64),
