@@ -50,6 +50,7 @@ MODULES = (
     "mcz.sources.text.layout",
     "mcz.sources.tables.layout",
     "mcz.sources.arrays.layout",
+    "mcz.sources.arrays.deflate",
     "mcz.sources.text.notes",
     "mcz.sources.tables.source",
     "mcz.sources.c3d.layout",

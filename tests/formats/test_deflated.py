@@ -69,7 +69,7 @@ def test_streams_come_back(data: bytes, level: int, memory: int, strategy: int) 
 
 @pytest.mark.parametrize("level", sorted(LEVELS))
 def test_streams_of_zlib_need_no_corrections(level: int) -> None:
-    """What is kept of a stream is its codes: one percent of it, or less."""
+    """Codes are all that is kept of a stream: one or two percent of it."""
     rng = np.random.default_rng(level)
     words = [rng.bytes(n) for n in range(3, 60)]
     text = b"".join(words[k] for k in rng.integers(0, len(words), 3000))

@@ -189,7 +189,7 @@ def _join(described: Deflated, contents: bytes) -> bytes:
     out = np.zeros(size, np.uint8)
     work = _work(contents, described.level)
     written = loops.join_stream(*work, blocks, _padded(codes), corrections, out)
-    if written < 0:  # ARRAY-22
+    if written < 0:  # ARRAY-23
         raise FormatError(f"source detail: deflate: {FAULTS[written]}")
     return out[:written].tobytes()
 
