@@ -301,7 +301,7 @@ TEXTS = [f"c{module}\n{word}\n" for module in MODULES.split() for word in WORDS.
 HEAD = pickle.dumps({"dof_pos": floats(4, 2)}, 4)
 
 
-@pytest.mark.parametrize("function", FUNCTIONS, ids=str)
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)
 def test_calls_are_refused_by_name(function: Any) -> None:
     for protocol in range(6):
         for value in (

@@ -101,9 +101,9 @@ def describe_stream(stream: bytes, contents: bytes) -> bytes:
         )
         part = build(searched, "deflated member")
         if _join(searched, contents) == stream:
-            parts.append(part)
             if not corrections:
-                break
+                return part
+            parts.append(part)
     return min(parts, key=len)
 
 
