@@ -30,7 +30,6 @@ from mcz.codecs.coding.forms import BINARY32
 from mcz.codecs.coding.forms.counts import Law
 from mcz.codecs.coding.forms.products import DEGREE, of_products
 from mcz.model.numbers import Grid, GridKind
-from mcz.sources.arrays.deflate import describe_stream, restore_stream
 from mcz.sources.sample import bvh_walk
 from mcz.sources.text import bvh
 from tests.codecs.lossy import encode_file, markers, rough
@@ -195,6 +194,8 @@ def stream_frames() -> None:
 
 def deflate_streams() -> None:
     """A stream of zlib, taken apart and joined."""
+    from mcz.sources.arrays.deflate import describe_stream, restore_stream
+
     contents = bytes(k * k % 251 for k in range(3000)) * 2
     stream = zlib.compress(contents)[2:-4]
     assert restore_stream(describe_stream(stream, contents), contents) == stream

@@ -75,8 +75,8 @@ def test_api_says_what_is_there(server: Server) -> None:
     ]
     assert (api["canEncode"], api["canConvert"], api["salvage"]) == (True, True, False)
     assert api["diff"] is False  # there are three
-    known = ".amc .asf .bvh .c3d .csv .mot .npy .npz .sto .trc .tsv".split()
-    assert api["suffixes"] == known
+    texts = ".amc .asf .bvh .csv .mot .mvnx .sto .trc .tsv"
+    assert api["suffixes"] == sorted(f"{texts} .c3d .joblib .npy .npz .pickle .pkl".split())
     assert api["version"] == mcz.__version__
     codecs = {codec["name"]: codec for codec in api["codecs"]}
     assert next(iter(codecs)) == "posewave"  # what "lossy" stands for

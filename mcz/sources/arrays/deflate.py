@@ -119,19 +119,19 @@ def restore_stream(part: bytes, contents: bytes) -> bytes:
     """
     described = parse(Deflated, part, "source detail")
     _check(described)
-    if zlib.crc32(contents) != described.crc:
+    if zlib.crc32(contents) != described.crc:  # ARRAY-22
         return b"".join(_stored_blocks(contents))
     return described.stream if described.level == NO_SEARCH else _join(described, contents)
 
 
 def _check(described: Deflated) -> None:
-    """Raise FormatError for fields that go with another level or kind."""  # ARRAY-21
+    """Raise FormatError for fields that go with another level or kind."""
     items = (*described.blocks, *described.corrections)
     is_kept = described.level == NO_SEARCH
-    if items if is_kept else described.stream or not described.blocks:
+    if items if is_kept else described.stream or not described.blocks:  # ARRAY-21
         raise FormatError(f"source detail: a stream or blocks do not fit level {described.level}")
     for block in described.blocks:
-        if block.codes and block.kind != DYNAMIC:
+        if block.codes and block.kind != DYNAMIC:  # ARRAY-21
             raise FormatError(f"source detail: codes of a block of kind {block.kind}")
 
 
