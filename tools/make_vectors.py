@@ -83,6 +83,8 @@ def row(vector: Vector, ids: Sequence[str] = (), fault: Fault | None = None) -> 
         fields["formats"] = formats_of(vector)
     if fault:
         fields |= {"fault": fault.kind, "effect": fault.effect, "reason": fault.reason}
+    if vector.is_crafted:
+        fields["crafted"] = True
     if vector.seed is not None:
         fields["seed"] = vector.seed
     if vector.parts:

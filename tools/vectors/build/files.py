@@ -62,6 +62,7 @@ class Vector:
     with the bytes behind them, ``sources`` pairs of path and bytes; ``modes`` are the calls that
     are made: "arrays", "sources". ``parts`` are (arguments, arrays) of partial reads. ``seed``
     is that of a file made at random, ``since`` the version of the format that first had it.
+    ``is_crafted``: its sources were made for a reader, and an encoder may refuse them.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Vector:
     parts: tuple[tuple[tuple[str, ...], tuple[tuple[dict[str, Any], bytes], ...]], ...] = ()
     seed: int | None = None
     since: str = FORMAT_NAME
+    is_crafted: bool = False
 
 
 class _Unchecked(ClipCopy):

@@ -88,6 +88,12 @@ class Row:
         """
         return bool({"segments", "clips"} & set(self.fields))
 
+    @property
+    def is_crafted(self) -> bool:
+        """True where no program but this one wrote what the file restores."""
+        made = self.has_segments or bool(self.fields.get("edit"))
+        return made or str(self.fields["base"]).startswith("by_hand")
+
     def vector(self) -> Vector:
         """The file, and what a decoder must make of it."""
         fields = self.fields
@@ -117,6 +123,7 @@ class Row:
                 for text in fields.get("parts", ())
             ),
             since=fields.get("since", FORMAT_NAME),
+            is_crafted="sources" in modes and OK in exit_ and self.is_crafted,
         )
 
 
