@@ -109,7 +109,8 @@ def describe_stream(stream: bytes, contents: bytes) -> bytes:
 
 def is_kept(part: bytes) -> bool:
     """Return True if ``describe_stream`` had to keep the stream itself."""
-    return part[Int32ul.sizeof()] == NO_SEARCH  # the level follows the CRC-32
+    level: int = part[Int32ul.sizeof()]  # which follows the CRC-32
+    return level == NO_SEARCH
 
 
 def restore_stream(part: bytes, contents: bytes) -> bytes:
