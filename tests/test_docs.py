@@ -199,7 +199,7 @@ def test_links_and_paths_lead_somewhere(page: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("page", "most"), [("README.md", 120), *((p, 160) for p in MANUAL if p != API)]
+    ("page", "most"), [("README.md", 110), *((p, 160) for p in MANUAL if p != API)]
 )
 def test_pages_stay_short(page: str, most: int) -> None:
     assert len(text_of(page).splitlines()) <= most
