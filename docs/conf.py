@@ -8,6 +8,7 @@ another file of the repository is plain text here, since a site has no such file
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 from posixpath import dirname, join, normpath, relpath
 
@@ -15,10 +16,13 @@ from sphinx.application import Sphinx
 
 import mcz
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tools import notebooks
+
 project = "MCZ"
 version = release = mcz.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "_notebooks"]
 html_theme = "furo"
 html_title = f"MCZ {release}"
 html_show_copyright = False
@@ -70,7 +74,20 @@ def add_contents(app: Sphinx, page: str, source: list[str]) -> None:
             )
 
 
+def write_notebooks(app: Sphinx) -> None:
+    notebooks.write_notebooks(Path(app.srcdir) / "_notebooks")
+
+
+def offer_notebook(app: Sphinx, page: str, source: list[str]) -> None:
+    """Link a page that is a notebook, too, to its file."""
+    if f"{page}.md" in notebooks.PAGES:
+        path = f"/_notebooks/{Path(page).name}.ipynb"
+        source[0] += f"\n{{download}}`This page as a Jupyter notebook <{path}>`\n"
+
+
 def setup(app: Sphinx) -> None:
+    app.connect("builder-inited", write_notebooks)
+    app.connect("source-read", offer_notebook)
     app.connect("source-read", mend_links)
     app.connect("source-read", include)
     app.connect("source-read", add_contents)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import doctest
 import io
+import json
 import re
 import shlex
 import subprocess
@@ -30,6 +31,7 @@ from mcz.cli.main import COMMANDS, cli
 from mcz.codecs import CODECS
 from mcz.codecs.parameters import TARGETS
 from mcz.sources import FORMATS
+from tools import notebooks
 
 ROOT = Path(mcz.__file__).parents[1]
 MANUAL = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md"))
@@ -288,6 +290,15 @@ def test_public_names_are_in_the_manual() -> None:
 def test_the_index_lists_every_page() -> None:
     listed = re.findall(r"^\| \[[\w-]+\]\(([\w/-]+\.md)\)", text_of("docs/index.md"), re.M)
     assert sorted(f"docs/{path}" for path in listed) == [p for p in MANUAL if p != "docs/index.md"]
+
+
+def test_notebooks_have_every_block_of_their_page(tmp_path: Path) -> None:
+    for page, path in zip(notebooks.PAGES, notebooks.write_notebooks(tmp_path), strict=True):
+        cells = json.loads(path.read_text("utf-8"))["cells"]
+        languages = [block.language for block in blocks(f"docs/{page}")]
+        code = [cell for cell in cells if cell["cell_type"] == "code"]
+        assert len(code) == 1 + languages.count("sh") + languages.count("python")
+        assert sum(len(cell["outputs"]) for cell in code) == languages.count("output")
 
 
 def test_the_picture_shows_what_is_measured(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 # Examples may leave a value unused, take what is not there for granted, and say no types.
 ALLOWED = ("no-untyped-def", "no-untyped-call", "type-arg")
 
