@@ -100,6 +100,7 @@ if TYPE_CHECKING:
     from mcz.show.rerun import to_rerun
     from mcz.show.viewing.view import View, view
     from mcz.sources.arrays.body_models import offsets_from_positions, offsets_of_model
+    from mcz.sources.arrays.libraries import split_clips
     from mcz.sources.arrays.skeletons import body_skeleton
     from mcz.sources.c3d.recording import Event, ForcePlatform, Recording
 
@@ -193,6 +194,7 @@ _HOMES = {
     "mcz.files.reading.source_files": ("read_skeleton",),
     "mcz.kinematics.rest_pose": ("rest_positions",),
     "mcz.sources.arrays.body_models": ("offsets_from_positions", "offsets_of_model"),
+    "mcz.sources.arrays.libraries": ("split_clips",),
     "mcz.sources.arrays.skeletons": ("body_skeleton",),
     "mcz.sources.c3d.recording": ("Event", "ForcePlatform", "Recording"),
     "mcz.kinematics.retargeting.joint_maps": ("joint_map",),
@@ -317,6 +319,7 @@ __all__ = [
     "set_metadata",
     "set_rate",
     "split",
+    "split_clips",
     "stream_decode",
     "stream_encode",
     "times",

@@ -118,15 +118,68 @@ def test_order_of_the_quaternion() -> None:
         assert (channels[0].name == "qx") == is_named
 
 
-def test_a_single_clip_and_several() -> None:
+def test_a_single_clip() -> None:
     clip = robot()
     motion = read(pickle.dumps({"day/walk": clip}))
     assert motion.metadata["x-clip"] == "day/walk" and motion.n_frames == 60
     assert read(pickle.dumps([[clip]])).n_frames == 60
-    with pytest.raises(SourceError, match="2 clips.*'a' and 'b'.*split it in Python"):
-        read(pickle.dumps({"a": clip, "b": robot(20)}))
-    with pytest.raises(SourceError, match="2 clips"):
-        read(pickle.dumps([clip, robot(20)]))
+    with pytest.raises(mcz.OptionError, match="'walk' is no library of clips"):
+        mcz.split_clips(motion)
+
+
+@pytest.mark.parametrize("protocol", [*PLAIN, "joblib"])
+def test_a_library_of_clips(protocol: Any, tmp_path: Path) -> None:
+    """The clips follow each other, and a number is missing between two."""
+    clips = {"walk": robot(60), "run": robot(1), "a/jump": robot(20)}
+    if protocol == "joblib":
+        joblib = pytest.importorskip("joblib")
+        buffer = io.BytesIO()
+        joblib.dump(clips, buffer)
+        data = buffer.getvalue()
+    else:
+        data = pickle.dumps(clips, protocol)
+    motion = read(data)
+    assert motion.n_frames == 81 and motion.frame_rate == 30
+    assert motion.frame_numbers is not None
+    assert motion.frame_numbers[[0, 59, 60, 61, 80]].tolist() == [1, 60, 62, 64, 83]
+    assert motion.metadata["x-clips"] == '{"walk": [1, 60], "run": [62, 62], "a/jump": [64, 83]}'
+    for name, part in mcz.split_clips(motion).items():
+        np.testing.assert_array_equal(part.values, clips[name]["dof_pos"])
+        assert part.source is None and part.metadata["x-clip"] == name
+        assert part.frame_numbers is None and part.frame_rate == 30
+    mcz.write(motion, tmp_path / "library.mcz")
+    windows = mcz.dataset(tmp_path / "library.mcz", "channels", window=20, stride=1)
+    assert len(windows) == 41 + 1  # none of two clips
+
+
+@pytest.mark.parametrize("codec", ["fast", "lossy"])
+def test_frames_and_errors_of_a_library(codec: str) -> None:
+    motion = read(pickle.dumps({"walk": robot(60), "run": robot(30)}))
+    bounds = {} if codec == "fast" else {"max_error": 0.001}
+    out = io.BytesIO()
+    mcz.write(motion, out, codec, **bounds)
+    with mcz.open(out.getvalue()) as file:
+        whole = pickle.loads(file.only_clip().source_bytes())
+        part = pickle.loads(file.only_clip().source_bytes((50, 64)))
+        early = pickle.loads(file.only_clip().source_bytes((3, 9)))
+    np.testing.assert_allclose(whole["run"]["dof_pos"], robot(30)["dof_pos"], atol=0.001)
+    np.testing.assert_array_equal(part["walk"]["root_rot"], whole["walk"]["root_rot"][50:])
+    np.testing.assert_array_equal(part["run"]["dof_pos"], whole["run"]["dof_pos"][:4])
+    assert early["walk"]["dof_pos"].shape == (6, 5) and early["run"]["dof_pos"].shape == (0, 5)
+
+
+def test_clips_that_differ() -> None:
+    """Arrays that some clips lack or have otherwise stay bytes, and so do facts that differ."""
+    walk, run = robot(60), robot(20)
+    run |= {"fps": 50, "root_pos": run["root_pos"].astype(np.float32)}
+    walk["force"] = np.repeat(walk["root_pos"], 2, axis=0)
+    run["force"] = np.repeat(run["root_rot"], 3, axis=0)
+    motion = read(pickle.dumps([{"walk": walk, "empty": {"a": np.zeros((0, 3))}}, [run]]))
+    assert [signal.name for signal in motion.signals] == ["motion", "root_rot", "local_body_pos"]
+    assert motion.frame_rate is None and motion.n_frames == 80
+    assert [*mcz.split_clips(motion)] == ["0/walk", "1/0"]
+    with pytest.raises(SourceError, match="2 clips in one file, such as '0' and '1', have no"):
+        read(pickle.dumps([{"a": np.zeros((4, 2))}, {"a": np.zeros((4, 3))}]))
 
 
 def test_array_of_objects() -> None:
@@ -374,6 +427,7 @@ def test_damaged_files_are_restored_or_refused() -> None:
     clip = {"fps": 30, "dof_pos": floats(4, 2), "root_pos": floats(4, 3), "dof_names": ["a", "b"]}
     files = [pickle.dumps(clip, protocol) for protocol in (0, 2, 4, 5)]
     files.append(joblib_file({"a": clip}))
+    files.append(pickle.dumps({"a": clip, "b": clip | {"dof_pos": floats(3, 2)}}, 4))
     n_tried = 0
     for data in files:
         for at in range(len(data)):

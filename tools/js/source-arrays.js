@@ -17,6 +17,7 @@ const SIZE8 = 6;
 const DEFLATE = 7;
 const ROWS = 8;
 const SIZE1 = 9;
+const PART = 10;
 /** Bytes of the kinds that follow from other pieces. */
 const SIZES = { [CRC]: 4, [SIZE4]: 4, [SIZE8]: 8, [SIZE1]: 1 };
 
@@ -55,13 +56,16 @@ function integer(size, signed) {
  *
  * @param {object} source of CLIP: template.data, detail
  * @param {object[]} signals all of them, decoded: see sources.js
+ * @param {{frame: number, number: bigint}[]} numbers runs of frame numbers that grow by 1
+ * @param {number} nFrames
  * @param {number} maxBytes the limit of the caller
  * @returns {Uint8Array}
  * @throws {Refused}
  */
-export function restoreArrays(source, signals, maxBytes) {
+export function restoreArrays(source, signals, numbers, nFrames, maxBytes) {
   const pieces = readPieces(source.template.data, source.detail);
   checkSpans(pieces);
+  placeRows(pieces, signals, numbers, nFrames);
   const nValues = signals.reduce((sum, { nRows, nChannels }) => sum + nRows * nChannels, 0);
   const most = Math.min(maxBytes, Math.max(LEAST_LIMIT, BYTES_PER_VALUE * nValues));
   const nOfFile = countFilePieces(pieces);
@@ -85,6 +89,37 @@ export function restoreArrays(source, signals, maxBytes) {
     view.setUint32(starts[k], sums.get(stop), true);
   });
   return out.subarray(0, starts[nOfFile]);
+}
+
+/** Gives each piece of a signal its rows, from `row` on `nRows`: those of the PART before it. */
+function placeRows(pieces, signals, numbers, nFrames) {
+  let part = null;
+  for (const piece of pieces) {
+    if (piece.kind === PART) {
+      if (piece.start > piece.stop) throw new Refused("arrays: a PART that ends before it begins");
+      part = [piece.start, piece.stop].map((number) => countBefore(number, numbers, nFrames));
+    }
+    if (![COUNT, DATA, ROWS].includes(piece.kind)) continue;
+    const decoded = signals[piece.signal];
+    if (!decoded) throw new Refused(`arrays: signal ${piece.signal} of ${signals.length}`);
+    const [first, stop] = part ?? [0, nFrames];
+    const perFrame = nFrames === 0 ? 0 : decoded.nRows / nFrames;
+    piece.row = first * perFrame;
+    piece.nRows = (stop - first) * perFrame;
+  }
+}
+
+/** How many frames have a number less than `limit`. */
+function countBefore(limit, numbers, nFrames) {
+  let [low, high] = [0, numbers.length]; // the runs that begin below it
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (Number(numbers[middle].number) < limit) low = middle + 1;
+    else high = middle;
+  }
+  if (low === 0) return 0;
+  const { frame, number } = numbers[low - 1];
+  return Math.min(frame + limit - Number(number), numbers[low]?.frame ?? nFrames);
 }
 
 /** The number of pieces that are the file: the others are contents of DEFLATE pieces. */
@@ -156,6 +191,7 @@ function readPiece(reader, left) {
     case SIZE8:
     case DEFLATE:
     case SIZE1:
+    case PART:
       return { kind, start: reader.varint(), stop: reader.varint() };
     default:
       return reader.refuse(`a piece of kind ${kind}`);
@@ -194,7 +230,7 @@ function follows(kind) {
 function checkSpans(pieces) {
   const nOfFile = countFilePieces(pieces);
   for (const { kind } of pieces.slice(nOfFile)) {
-    if (follows(kind)) throw new Refused(`arrays: a piece of kind ${kind} in contents`);
+    if (follows(kind) || kind === PART) throw new Refused(`arrays: a piece of kind ${kind} in contents`);
   }
   const sums = [0]; // CRC pieces before each piece
   for (const { kind } of pieces) sums.push(sums[sums.length - 1] + (kind === CRC ? 1 : 0));
@@ -223,9 +259,9 @@ function sizeOf(piece, signals) {
   const { kind } = piece;
   if (kind === TEXT || kind === OWN || kind === DEFLATE) return piece.text.length;
   if (kind in SIZES) return SIZES[kind];
-  const decoded = signals[piece.signal];
-  if (!decoded) throw new Refused(`arrays: signal ${piece.signal} of ${signals.length}`);
+  if (kind === PART) return 0;
   if (kind === COUNT || kind === ROWS) return piece.size;
+  const decoded = signals[piece.signal];
   let nColumns = 0;
   for (const { channel, nChannels } of piece.runs) {
     if (channel + nChannels > decoded.nChannels) {
@@ -233,7 +269,7 @@ function sizeOf(piece, signals) {
     }
     nColumns += nChannels;
   }
-  return decoded.nRows * nColumns * piece.type.size;
+  return piece.nRows * nColumns * piece.type.size;
 }
 
 /** Puts the bytes of a piece of any kind but CRC. */
@@ -242,7 +278,7 @@ function put(out, view, starts, piece, at, signals) {
   if (kind === TEXT || kind === OWN || kind === DEFLATE) {
     out.set(piece.text, at);
   } else if (kind === COUNT) {
-    const number = String(signals[piece.signal].nRows);
+    const number = String(piece.nRows);
     const used = number.length + piece.after.length;
     if (used > piece.size) throw new Refused(`arrays: a count of ${used} bytes, not ${piece.size}`);
     out.fill(32, at, at + piece.size);
@@ -251,8 +287,8 @@ function put(out, view, starts, piece, at, signals) {
   } else if (kind === DATA) {
     putNumbers(view, at, piece, signals[piece.signal]);
   } else if (kind === ROWS) {
-    putRows(view, at, piece.size, signals[piece.signal].nRows);
-  } else if (kind !== CRC) {
+    putRows(view, at, piece.size, piece.nRows);
+  } else if (kind !== CRC && kind !== PART) {
     const size = starts[piece.stop] - starts[piece.start];
     const width = SIZES[kind];
     if (width < 8 && size >= 2 ** (8 * width)) {
@@ -273,17 +309,17 @@ function putRows(view, at, size, nRows) {
   for (let k = 0; k < size; k++) view.setUint8(at + k, Math.floor(nRows / 2 ** (8 * k)) % 256);
 }
 
-function putNumbers(view, at, { type, flags, runs }, decoded) {
+function putNumbers(view, at, { type, flags, runs, row, nRows }, decoded) {
   const channels = [];
   for (const { channel, nChannels } of runs) {
     for (let k = 0; k < nChannels; k++) channels.push(channel + k);
   }
   const words = new Words(type, (flags & BIG_ENDIAN) === 0, decoded);
   const byColumns = (flags & BY_COLUMNS) !== 0;
-  for (let row = 0; row < decoded.nRows; row++) {
+  for (let r = 0; r < nRows; r++) {
     for (let k = 0; k < channels.length; k++) {
-      const place = byColumns ? k * decoded.nRows + row : row * channels.length + k;
-      words.put(view, at + place * type.size, row, channels[k]);
+      const place = byColumns ? k * nRows + r : r * channels.length + k;
+      words.put(view, at + place * type.size, row + r, channels[k]);
     }
   }
 }

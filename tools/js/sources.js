@@ -40,7 +40,7 @@ function restored(kind, { clip, signals, numbers, maxBytes }) {
   if (kind === "c3d") {
     return restoreC3d(source, signals, clip.nFrames, numbers[0].number, maxBytes);
   }
-  if (kind === "arrays") return restoreArrays(source, signals, maxBytes);
+  if (kind === "arrays") return restoreArrays(source, signals, numbers, clip.nFrames, maxBytes);
   if (kind === "table") {
     const names = clip.skeleton.joints.map(({ name }) => name);
     return restoreTable(source, signals, numbers, names, maxBytes);

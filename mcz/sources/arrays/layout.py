@@ -38,10 +38,12 @@ class Kind(IntEnum):
     DEFLATE = 7  # the deflate stream of other pieces
     ROWS = 8  # the number of rows, an integer
     SIZE1 = 9  # how many bytes other pieces have, u8
+    PART = 10  # no bytes: pieces after it are of some of the frames
 
 
 SIZES = {Kind.SIZE1: 1, Kind.CRC: 4, Kind.SIZE4: 4, Kind.SIZE8: 8}  # bytes of these kinds
 OF_PIECES = (*SIZES, Kind.DEFLATE)
+_OF_SPAN = (*OF_PIECES, Kind.PART)
 _OF_ROWS = (Kind.COUNT, Kind.DATA, Kind.ROWS)
 _OF_DETAIL = (Kind.OWN, Kind.DEFLATE)
 _OF_CONTENTS = (Kind.TEXT, Kind.OWN, *_OF_ROWS)
@@ -84,10 +86,10 @@ class ArrayPiece(Record):
     runs: list[ArrayRun] | None = field(
         _if((Kind.DATA,), counted(ArrayRun, kind="runs")), "DATA only: its columns, in order"
     )
-    start: int | None = field(_if(OF_PIECES, UVARINT), "CRC, SIZE and DEFLATE only: first piece")
-    stop: int | None = field(
-        _if(OF_PIECES, UVARINT), "CRC, SIZE and DEFLATE only: the piece after the last"
+    start: int | None = field(
+        _if(_OF_SPAN, UVARINT), "CRC, SIZE and DEFLATE: first piece; PART: first frame number"
     )
+    stop: int | None = field(_if(_OF_SPAN, UVARINT), "what comes after the last of these")
 
 
 class ArrayTemplate(Record):
@@ -108,7 +110,10 @@ class ArrayDetail(Record):
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A piece of a file; what does not go with its kind is empty. See ArrayPiece."""
+    """A piece of a file; what does not go with its kind is empty. See ArrayPiece.
+
+    ``part`` are the frame numbers, first and behind the last, that it is of; None: all.
+    """
 
     kind: Kind
     text: bytes = b""  # of OWN pieces, too; of a DEFLATE piece its part of the detail
@@ -120,6 +125,7 @@ class Piece:
     runs: tuple[tuple[int, int], ...] = ()  # (first channel, channels)
     start: int = 0
     stop: int = 0
+    part: tuple[int, int] | None = None
 
     @property
     def n_columns(self) -> int:
@@ -170,8 +176,9 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
     if n_parts != len(parts):  # ARRAY-05
         raise FormatError(f"source detail: {len(parts)} parts, but {n_parts} pieces have one")
     own = iter(parts)
-    return tuple(
-        Piece(
+    pieces, part = [], None
+    for row in fields:
+        piece = Piece(
             Kind(row.kind),
             next(own) if row.kind in _OF_DETAIL else row.text or b"",
             row.signal or 0,
@@ -182,9 +189,14 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
             tuple((run.channel, run.n_channels) for run in row.runs or ()),
             row.start or 0,
             row.stop or 0,
+            part,
         )
-        for row in fields
-    )
+        if piece.kind == Kind.PART:
+            part = piece.start, piece.stop
+            if piece.start > piece.stop:  # ARRAY-33
+                raise FormatError(f"source template: frames {piece.start} to {piece.stop}")
+        pieces.append(piece)
+    return tuple(pieces)
 
 
 def n_file_pieces(pieces: Sequence[Piece]) -> int:

@@ -64,9 +64,9 @@ class Meaning:
 
 
 def meaning_of(arrays: Sequence[Array]) -> Meaning:
-    """Interpret the arrays of a file; raises SourceError if none of them is a motion."""
+    """Interpret the arrays of a clip; raises SourceError if none of them is a motion."""
     body = body_of(arrays)
-    n_frames = body.n_frames if body is not None else _frames_of(arrays)
+    n_frames = body.n_frames if body is not None else frames_of(arrays)
     rate, exact, odd = rate_of(arrays, n_frames)
     skeleton = body.skeleton if body is not None else Skeleton((), angle_unit="")
     meaning = Meaning(skeleton, rate, exact, facts_of(arrays), notes=odd)
@@ -100,7 +100,7 @@ def _add_body(meaning: Meaning, body: Body) -> None:
     meaning.places |= {index: (0, columns) for index, columns in body.places.items()}
 
 
-def _frames_of(arrays: Sequence[Array]) -> int:
+def frames_of(arrays: Sequence[Array]) -> int:
     """The number of frames: of the times, of a robot's joints, else the longest first axis."""
     numbers = [array for array in arrays if not array.kept]
     times = [array.n_rows for array in numbers if array.name in TIMES and len(array.head.shape) < 2]

@@ -5,9 +5,10 @@ SPEC.md, "The bytes of arrays", says what a template has of one; ``pickle_machin
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import accumulate
 
 import numpy as np
@@ -48,26 +49,25 @@ COMPRESSED = {
     b"\x04\x22\x4d\x18": "lz4",
 }
 MAX_DEPTH, MAX_NAME = 32, 512  # of a place in a pickle: keys, characters
-MAX_ARRAYS, MAX_FACTS = 2**14, 256
+MAX_ARRAYS, MAX_FACTS = 2**15, 256  # of a file, of a clip
 SEPARATOR = "/"
 
 
-SEVERAL = (
-    "{n} clips in one file, such as {one!r} and {two!r}, and a motion has one; where you trust the "
-    "file, split it in Python: for name, clip in joblib.load(path).items(): "
-    "joblib.dump({{name: clip}}, name.replace('/', '_') + '.pkl')"
-)
 NESTS = (Dict, list, tuple, PickledArray)
 
 
 @dataclass(frozen=True, slots=True)
 class Pickle:
-    """``arrays`` have the numbers and texts, too; ``clip`` is the key of a single clip."""
+    """``arrays`` have the numbers and texts, too; ``clip`` is the key of a single clip.
+
+    ``clips`` are several: by their names, the index of each array by its name within the clip.
+    """
 
     arrays: list[Array]
     archive: Archive
     clip: str = ""
     notes: tuple[str, ...] = ()
+    clips: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
 
 def read_pickle(data: bytes, at: int = 0) -> Pickle:
@@ -81,13 +81,14 @@ def read_pickle(data: bytes, at: int = 0) -> Pickle:
             )
     machine = Machine(data, at)
     root, clip = _single_clip(machine, machine.run())
-    _refuse_clips(machine, root)
-    arrays, fields = _Reader(machine).read(root)
+    reader = _Reader(machine, _clips(machine, root))
+    arrays, fields = reader.read(root)
     fields += [Field(field, Kind.SIZE8, start, stop) for field, start, stop in machine.frames]
     rest = len(data) - machine.at
     notes = (f"{rest} bytes follow the pickle",) if rest else ()
     fields.sort(key=lambda field: field.at)
-    return Pickle(arrays, Archive(data, len(data), fields=tuple(fields)), clip, notes)
+    archive = Archive(data, len(data), fields=tuple(fields))
+    return Pickle(arrays, archive, clip, notes, reader.members)
 
 
 def _children(machine: Machine, node: object) -> list[tuple[str, object]]:
@@ -122,25 +123,38 @@ def _single_clip(machine: Machine, root: object) -> tuple[object, str]:
     return root, clip
 
 
-def _refuse_clips(machine: Machine, root: object) -> None:
-    """Raise SourceError for several clips: dictionaries that have arrays of the same keys."""
-    children = _children(machine, root)
-    clips = {id(child): (name, child) for name, child in children if isinstance(child, Dict)}
-    owners: dict[str, str] = {}
-    for name, clip in clips.values():
-        for key, value in _children(machine, clip):
-            if not isinstance(value, PickledArray) or len(value.shape) < 2:
-                continue
-            other = owners.setdefault(key, name)
-            if other != name:
-                raise SourceError(SEVERAL.format(n=len(clips), one=other[:80], two=name[:80]))
+def _clips(machine: Machine, root: object) -> set[int]:
+    """The identities of several clips: dictionaries that have arrays of the same keys."""
+    clips: set[int] = set()
+    keys: Counter[str] = Counter()
+    seen: set[int] = set()
+    waiting = [(0, root)]
+    while waiting:
+        depth, node = waiting.pop()
+        if depth > MAX_DEPTH or id(node) in seen or not isinstance(node, NESTS):
+            continue
+        seen.add(id(node))
+        below = _children(machine, node)
+        arrays = [k for k, v in below if isinstance(v, PickledArray) and len(v.shape) > 1]
+        if isinstance(node, Dict) and arrays:
+            clips.add(id(node))
+            keys.update(arrays)
+        else:
+            waiting += [(depth + 1, value) for _, value in below]
+    return clips if max(keys.values(), default=0) > 1 else set()
 
 
 class _Reader:
-    """The arrays below a value, each once and with the bytes that are its own."""
+    """The arrays below a value, each once and with the bytes that are its own.
 
-    def __init__(self, machine: Machine) -> None:
+    ``members`` are those of each dictionary among ``clips``.
+    """
+
+    def __init__(self, machine: Machine, clips: Set[int]) -> None:
         self.machine = machine
+        self.clips = clips
+        self.members: dict[str, dict[str, int]] = {}
+        self.clip: str | None = None  # that arrays are added to
         self.data = machine.data
         self.arrays: list[Array] = []
         self.fields: list[Field] = []
@@ -151,9 +165,9 @@ class _Reader:
     def read(self, root: object) -> tuple[list[Array], list[Field]]:
         """The arrays in order, and the lengths of their bytes."""
         seen: set[int] = set()
-        waiting: list[tuple[str, str, int, object]] = [("", "", 0, root)]
+        waiting: list[tuple[str, str, int, object, str | None]] = [("", "", 0, root, None)]
         while waiting:
-            prefix, key, depth, node = waiting.pop()
+            prefix, key, depth, node, self.clip = waiting.pop()
             name = prefix + key
             if len(name) > MAX_NAME or depth > MAX_DEPTH or id(node) in seen:
                 continue
@@ -166,7 +180,9 @@ class _Reader:
             elif not self._add_words(name, node):
                 below = _children(self.machine, node)[::-1]
                 prefix = name + SEPARATOR if name else ""
-                waiting += [(prefix, key, depth + 1, value) for key, value in below]
+                if id(node) in self.clips:
+                    self.clip, self.n_facts = name, 0
+                waiting += [(prefix, key, depth + 1, value, self.clip) for key, value in below]
         return self.arrays, self.fields
 
     def _add(self, array: Array) -> None:
@@ -175,6 +191,9 @@ class _Reader:
         if len(self.arrays) >= MAX_ARRAYS:
             raise SourceError(f"more than {MAX_ARRAYS} arrays")
         self.names.add(array.name)
+        if self.clip is not None:
+            key = array.name.removeprefix(self.clip + SEPARATOR)
+            self.members.setdefault(self.clip, {})[key] = len(self.arrays)
         self.arrays.append(array)
 
     def _add_array(self, name: str, node: PickledArray) -> None:

@@ -7,7 +7,7 @@ motion, ``restore.py`` what a file is made of.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from mcz.errors import MotionError, SourceError
@@ -16,11 +16,10 @@ from mcz.sources.arrays.archive import Archive
 from mcz.sources.arrays.columns import Array, columns_of, npy_array, npz_arrays, signal_of
 from mcz.sources.arrays.deflate import is_kept
 from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Kind, Piece, build_arrays
+from mcz.sources.arrays.libraries import CLIP, Library, join_clips
 from mcz.sources.arrays.meaning import Meaning, meaning_of
 from mcz.sources.arrays.pickles import Pickle, npy_objects, read_pickle
 from mcz.sources.arrays.restore import Placed, pieces_of, restore_arrays
-
-CLIP = "x-clip"  # the key of the only clip in a pickle
 
 
 def read_npy(data: bytes, name: str = "motion") -> Motion:
@@ -44,7 +43,14 @@ def read_pickle_file(data: bytes, name: str = "motion") -> Motion:
 
 
 def _pickled(format_name: str, name: str, pickle: Pickle) -> Motion:
-    motion = _motion(format_name, name, pickle.arrays, pickle.archive, pickle.notes)
+    library = join_clips(pickle.arrays, pickle.clips) if pickle.clips else None
+    motion = _motion(format_name, name, pickle.arrays, pickle.archive, pickle.notes, library)
+    if library is not None:
+        metadata = library.metadata | dict(motion.metadata)
+        numbers = library.frame_numbers
+        if len(numbers) != motion.n_frames:
+            raise SourceError(f"clips of {len(numbers)} frames, but a motion of {motion.n_frames}")
+        return replace(motion, metadata=metadata, frame_numbers=numbers)
     clip = {CLIP: pickle.clip} if pickle.clip else {}
     return replace(motion, metadata=clip | dict(motion.metadata))
 
@@ -64,10 +70,16 @@ def _motion(
     arrays: Sequence[Array],
     archive: Archive,
     notes: Sequence[str] = (),
+    library: Library | None = None,
 ) -> Motion:
-    meaning = meaning_of(arrays)
+    if library is None:
+        meaning = meaning_of(arrays)
+        placed = {k: Placed(arrays[k].head, *place) for k, place in meaning.places.items()}
+    else:
+        meaning = meaning_of(library.arrays)
+        placed = dict(library.placed(arrays, meaning.places))
     meaning.notes += notes
-    pieces = _pieces(arrays, archive, meaning)
+    pieces = _pieces(arrays, archive, placed)
     n_runs = sum(len(piece.runs) for piece in pieces)
     if len(pieces) > MAX_PIECES or n_runs > MAX_RUNS:
         raise SourceError(
@@ -100,14 +112,13 @@ def _signals(meaning: Meaning) -> list[Signal]:
     ]
 
 
-def _pieces(arrays: Sequence[Array], archive: Archive, meaning: Meaning) -> list[Piece]:
-    placed = [Placed(arrays[k].head, *place) for k, place in sorted(meaning.places.items())]
+def _pieces(arrays: Sequence[Array], archive: Archive, placed: Mapping[int, Placed]) -> list[Piece]:
     kept = [
         (array.head.start, array.stop)
         for k, array in enumerate(arrays)
-        if k not in meaning.places and array.stop > array.head.start
+        if k not in placed and array.stop > array.head.start
     ]
-    return pieces_of(archive, placed, kept)
+    return pieces_of(archive, [*placed.values()], kept)
 
 
 def _metadata(

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError, LimitError
+from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Motion, Signal
 from mcz.model.numbers import Grid, GridKind
-from mcz.model.types import Items
+from mcz.model.types import Ints, Items
 from mcz.sources.arrays.archive import Archive, Member
 from mcz.sources.arrays.columns import file_columns
 from mcz.sources.arrays.deflate import describe_stream, restore_stream
@@ -54,16 +55,16 @@ def restore_arrays(motion: Motion) -> bytes:
     assert source is not None
     parsed = parse_arrays(source.template, source.detail)
     check_spans(parsed)
-    signals = [signal.as_stored() for signal in motion.signals]
+    stored = _Stored(motion)
     n_columns = sum(piece.n_columns for piece in parsed)
     if n_columns > MAX_COLUMNS:
         raise LimitError(f"source template: {n_columns} columns, limit {MAX_COLUMNS}")
-    pieces = _deflated(parsed, signals)
-    starts = _starts(pieces, signals)
+    pieces = _deflated(parsed, stored)
+    starts = _starts(pieces, stored)
     out = bytearray(starts[-1])
     for piece, at, stop in zip(pieces, starts, starts[1:], strict=False):
         if piece.kind != Kind.CRC:
-            out[at:stop] = _bytes(piece, signals, starts)
+            out[at:stop] = _bytes(piece, stored, starts)
     known: dict[tuple[int, int], bytes] = {}
     for piece, at in zip(pieces, starts, strict=False):
         if piece.kind == Kind.CRC:  # ARRAY-15
@@ -74,60 +75,82 @@ def restore_arrays(motion: Motion) -> bytes:
     return bytes(memoryview(out)[: starts[n_file_pieces(pieces)]])
 
 
-def _starts(pieces: Sequence[Piece], signals: Sequence[Signal]) -> list[int]:
+class _Stored:
+    """The signals of a motion as the file has them, and the rows of each piece."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.signals = [signal.as_stored() for signal in motion.signals]
+        self._numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
+        self._ordinals: dict[int, Ints] = {}
+
+    def signal(self, piece: Piece) -> Signal:
+        if piece.signal >= len(self.signals):  # ARRAY-09
+            raise FormatError(f"source template: signal {piece.signal} of {len(self.signals)}")
+        return self.signals[piece.signal]
+
+    def rows(self, piece: Piece) -> range:
+        """The rows of its signal that a COUNT, DATA or ROWS piece is of."""
+        signal = self.signal(piece)
+        if piece.part is None:
+            return range(signal.n_rows)
+        first, stop = np.searchsorted(self._numbers, piece.part).tolist()  # ARRAY-34
+        return range(first * signal.samples_per_frame, stop * signal.samples_per_frame)
+
+    def ordinals(self, piece: Piece) -> Ints:
+        """The ordinals of the signal of a piece."""
+        if piece.signal not in self._ordinals:
+            self._ordinals[piece.signal] = self.signal(piece).to_ordinals()[0]
+        return self._ordinals[piece.signal]
+
+
+def _starts(pieces: Sequence[Piece], stored: _Stored) -> list[int]:
     """The offset of each piece, and the size of all; raises LimitError for too large a one."""
-    starts = [0, *accumulate(_size(piece, signals) for piece in pieces)]
-    most = max(SIZE_LIMIT, SIZE_PER_VALUE * sum(signal.values.size for signal in signals))
+    starts = [0, *accumulate(_size(piece, stored) for piece in pieces)]
+    most = max(SIZE_LIMIT, SIZE_PER_VALUE * sum(signal.values.size for signal in stored.signals))
     if starts[-1] > most:
         raise LimitError(f"source template: a file of {starts[-1]} bytes, limit {most}")
     return starts
 
 
-def _deflated(pieces: Sequence[Piece], signals: Sequence[Signal]) -> Sequence[Piece]:
+def _deflated(pieces: Sequence[Piece], stored: _Stored) -> Sequence[Piece]:
     """``pieces`` with the stream itself as the text of each DEFLATE piece."""
     if n_file_pieces(pieces) == len(pieces):
         return pieces
-    _starts(pieces, signals)
+    _starts(pieces, stored)
     return [
-        replace(piece, text=restore_stream(piece.text, _contents(piece, pieces, signals)))
+        replace(piece, text=restore_stream(piece.text, _contents(piece, pieces, stored)))
         if piece.kind == Kind.DEFLATE
         else piece
         for piece in pieces
     ]
 
 
-def _contents(piece: Piece, pieces: Sequence[Piece], signals: Sequence[Signal]) -> bytes:
-    return b"".join(_bytes(part, signals, ()) for part in pieces[piece.start : piece.stop])
+def _contents(piece: Piece, pieces: Sequence[Piece], stored: _Stored) -> bytes:
+    return b"".join(_bytes(part, stored, ()) for part in pieces[piece.start : piece.stop])
 
 
-def _size(piece: Piece, signals: Sequence[Signal]) -> int:
+def _size(piece: Piece, stored: _Stored) -> int:
     """The bytes of a piece; raises FormatError where it does not fit the signals."""
     match piece.kind:
         case Kind.TEXT | Kind.OWN | Kind.DEFLATE:
             return len(piece.text)
         case Kind.COUNT | Kind.ROWS:
-            _signal(piece, signals)
+            stored.signal(piece)
             if piece.kind == Kind.ROWS and piece.size not in ROW_SIZES:  # ARRAY-30
                 raise FormatError(f"source template: rows in {piece.size} bytes")
             return piece.size
         case Kind.DATA:
-            signal = _signal(piece, signals)
+            signal = stored.signal(piece)
             if any(first + n > signal.n_channels for first, n in piece.runs):  # ARRAY-10
                 raise FormatError(
                     f"source template: a run beyond the {signal.n_channels} channels of signal "
                     f"{signal.name!r}"
                 )
-            return signal.n_rows * piece.n_columns * int(TYPES[piece.type][1])
-    return SIZES[piece.kind]
+            return len(stored.rows(piece)) * piece.n_columns * int(TYPES[piece.type][1])
+    return SIZES.get(piece.kind, 0)
 
 
-def _signal(piece: Piece, signals: Sequence[Signal]) -> Signal:
-    if piece.signal >= len(signals):  # ARRAY-09
-        raise FormatError(f"source template: signal {piece.signal} of {len(signals)}")
-    return signals[piece.signal]
-
-
-def _bytes(piece: Piece, signals: Sequence[Signal], starts: Sequence[int]) -> Any:
+def _bytes(piece: Piece, stored: _Stored, starts: Sequence[int]) -> Any:
     """The bytes of a piece of any kind but CRC."""
     if piece.kind in SIZES:
         size = SIZES[piece.kind]
@@ -136,29 +159,31 @@ def _bytes(piece: Piece, signals: Sequence[Signal], starts: Sequence[int]) -> An
             raise FormatError(f"source template: a size of {number} in {size} bytes")
         return number.to_bytes(8, "little")[:size]
     if piece.kind == Kind.ROWS:
-        number = signals[piece.signal].n_rows
+        number = len(stored.rows(piece))
         if number >= 2 ** (8 * piece.size - (piece.size == 4)):  # ARRAY-31
             raise FormatError(f"source template: {number} rows in {piece.size} bytes")
         return number.to_bytes(8, "little")[: piece.size]
     if piece.kind == Kind.COUNT:  # ARRAY-13
-        text = b"%d" % signals[piece.signal].n_rows + piece.after
+        text = b"%d" % len(stored.rows(piece)) + piece.after
         if len(text) > piece.size:  # ARRAY-11
             raise FormatError(f"source template: {len(text)} bytes of a count, not {piece.size}")
         return text.ljust(piece.size)
     if piece.kind == Kind.DATA:
-        return array_words(signals[piece.signal], piece)
+        return _words(piece, stored)
     return piece.text
 
 
-def array_words(signal: Signal, piece: Piece) -> memoryview:
+def _words(piece: Piece, stored: _Stored) -> memoryview:
     """The numbers of a DATA piece, as it stores them."""
     kind, size = TYPES[piece.type][0], int(TYPES[piece.type][1])
     columns: Any = piece.columns
     if len(piece.runs) == 1:
         columns = slice(piece.runs[0][0], sum(piece.runs[0]))
-    values = signal.values[:, columns]
+    rows = stored.rows(piece)
+    cells = slice(rows.start, rows.stop), columns
+    values = stored.signal(piece).values[cells]
     if kind == "f":
-        words = _floats(signal, values, columns, f"f{size}")
+        words = _floats(values, piece, stored, cells)
     else:
         words = _integers(values, kind, size)
     if piece.flags & BY_COLUMNS:
@@ -166,13 +191,17 @@ def array_words(signal: Signal, piece: Piece) -> memoryview:
     return np.ascontiguousarray(words, piece.dtype).reshape(-1).view(np.uint8).data
 
 
-def _floats(signal: Signal, values: Items, columns: Any, type_: str) -> Items:
-    """Items as floats of a type; NaNs keep the bits that a binary grid of that type has."""
+def _floats(values: Items, piece: Piece, stored: _Stored, cells: Any) -> Items:
+    """Items as floats; NaNs keep the bits that a binary grid of their type has.
+
+    ``cells`` are the rows and columns of ``values`` in the signal.
+    """
+    signal, type_ = stored.signal(piece), TYPES[piece.type]
     with np.errstate(over="ignore", invalid="ignore"):
         words = values.astype(type_)  # ARRAY-14
     invalid = np.isnan(words)
     if signal.mask is not None:
-        invalid |= ~signal.mask[:, columns]
+        invalid |= ~signal.mask[cells]
     if not invalid.any():
         return words
     bits = words.view(f"u{words.itemsize}")
@@ -181,9 +210,8 @@ def _floats(signal: Signal, values: Items, columns: Any, type_: str) -> Items:
     grid = BINARY.get(words.itemsize)
     nan = np.isnan(values)
     if grid is not None and nan.any():
-        ordinals = signal.to_ordinals()[0][:, columns]
-        stored = nan & _on_grid(signal, grid.kind)[:, columns]
-        bits[stored] = grid.bits(ordinals[stored])
+        is_stored = nan & _on_grid(signal, grid.kind)[cells]
+        bits[is_stored] = grid.bits(stored.ordinals(piece)[cells][is_stored])
     return words
 
 
@@ -211,11 +239,15 @@ MAX_OWN = 1024  # bytes of an array that are the clip's own; more go into the te
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """An array and where its columns are: the signal, and the channel of each column."""
+    """An array and where its columns are: the signal, and the channel of each column.
+
+    ``part`` are the frame numbers of its rows, see ``Piece``.
+    """
 
     head: Head
     signal: int
     channels: Sequence[int]
+    part: tuple[int, int] | None = None
 
 
 def pieces_of(
@@ -259,16 +291,23 @@ def _of_stream(data: bytes, member: Member) -> tuple[int, int, Piece]:
 def _cut_pieces(
     data: bytes, spans: Sequence[tuple[int, int, Piece]], cuts: Sequence[int]
 ) -> tuple[list[int], list[Piece]]:
-    """The pieces of all spans with the text between, cut where others point; their offsets."""
+    """The pieces of all spans with the text between, cut where others point; their offsets.
+
+    A PART stands where the frames become others.
+    """
     starts: list[int] = []
     pieces: list[Piece] = []
-    at = 0
+    at, part = 0, None
     for start, stop, piece in (*spans, (len(data), len(data), Piece(Kind.TEXT))):
         inner = cuts[bisect_left(cuts, at + 1) : bisect_left(cuts, start)]
         for low, high in zip((at, *inner), (*inner, start), strict=True):
             if low < high:
                 starts.append(low)
                 pieces.append(Piece(Kind.TEXT, data[low:high]))
+        if piece.part is not None and piece.part != part:
+            part = piece.part
+            starts.append(start)
+            pieces.append(Piece(Kind.PART, start=part[0], stop=part[1]))
         if start < stop:
             starts.append(start)
             pieces.append(piece)
@@ -280,13 +319,13 @@ def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
     """The count in the head of an array, and its numbers."""
     head = array.head
     low, high = head.rows_at
-    count = Piece(Kind.ROWS, signal=array.signal, size=high - low)
+    count = Piece(Kind.ROWS, signal=array.signal, size=high - low, part=array.part)
     if head.is_printed:
         high = head.end
         while high < head.start and data[high : high + 1] == b" ":
             high += 1
         after = data[head.rows_at[1] : head.end]
-        count = Piece(Kind.COUNT, signal=array.signal, after=after, size=high - low)
+        count = replace(count, kind=Kind.COUNT, after=after, size=high - low)
     flags = BIG_ENDIAN * head.big_endian + BY_COLUMNS * head.by_columns
     order = file_columns(head)
     channels = [array.channels[column] for column in order.tolist()]
@@ -296,6 +335,7 @@ def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
         type=TYPES.index(head.code),
         flags=flags,
         runs=tuple(_runs(channels)),
+        part=array.part,
     )
     return [(low, high, count), (head.start, head.start + head.size, numbers)]
 

@@ -1,0 +1,140 @@
+"""Libraries of motions: a file of several clips is one motion, clip after clip.
+
+A frame number is missing between two clips. SPEC.md, "Template of arrays", says how a PART divides
+the rows among the arrays of a file.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeGuard
+
+import numpy as np
+
+from mcz.errors import OptionError, SourceError
+from mcz.model.clock import numbers_or_rows
+from mcz.model.motion import Motion
+from mcz.model.types import Ints
+from mcz.sources.arrays.columns import Array
+from mcz.sources.arrays.meaning import frames_of
+from mcz.sources.arrays.restore import Placed
+
+CLIP, CLIPS = "x-clip", "x-clips"  # the key of a clip in its file; those of all, with their frames
+NO_CLIPS = "{n} clips in one file, such as {one!r} and {two!r}, have no array in common"
+
+
+@dataclass(frozen=True, slots=True)
+class Library:
+    """The arrays that all clips have, joined; ``members`` are the indices of each in its file.
+
+    ``parts`` are the frame numbers of each clip, first and behind the last.
+    """
+
+    names: tuple[str, ...]
+    parts: tuple[tuple[int, int], ...]
+    arrays: list[Array]
+    members: list[Sequence[int]]
+
+    @property
+    def frame_numbers(self) -> Ints:
+        return np.concatenate([np.arange(*part) for part in self.parts])
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """The first and the last frame number of each clip, as JSON."""
+        pairs = zip(self.names, self.parts, strict=True)
+        return {CLIPS: json.dumps({name: [a, b - 1] for name, (a, b) in pairs})}
+
+    def placed(
+        self, arrays: Sequence[Array], places: Mapping[int, tuple[int, Sequence[int]]]
+    ) -> Iterator[tuple[int, Placed]]:
+        """The arrays of a file by their index; ``places`` are those of joined arrays."""
+        for joined, (signal, channels) in places.items():
+            for index, part in zip(self.members[joined], self.parts, strict=True):
+                yield index, Placed(arrays[index].head, signal, channels, part)
+
+
+def join_clips(arrays: Sequence[Array], clips: Mapping[str, Mapping[str, int]]) -> Library:
+    """Join the arrays of clips; ``clips`` have the index of each array by its name.
+
+    Arrays that some clips lack, or have in another shape, are in none. Raises SourceError where no
+    others are left.
+    """
+    own = {
+        name: {key: replace(arrays[k], name=key) for key, k in members.items()}
+        for name, members in clips.items()
+        if any(not arrays[k].kept and len(arrays[k].head.shape) > 1 for k in members.values())
+    }
+    rows = {key: [each.get(key) for each in own.values()] for key in next(iter(own.values()), {})}
+    alike = {key: found for key, found in rows.items() if _are_alike(found)}
+    if all(found[0].kept for found in alike.values()):
+        one, two = [*clips][:2]
+        raise SourceError(NO_CLIPS.format(n=len(clips), one=one[:80], two=two[:80]))
+    counts = [frames_of([each[key] for key in alike]) for each in own.values()]
+    starts = np.cumsum([1, *(count + 1 for count in counts)]).tolist()
+    joined = {
+        key: _joined(found)
+        for key, found in alike.items()
+        if found[0].kept or _have_even_rows(found, counts)
+    }
+    return Library(
+        tuple(own),
+        tuple((start, start + n) for start, n in zip(starts, counts, strict=False)),
+        [*joined.values()],
+        [[clips[name][key] for name in own] for key in joined],
+    )
+
+
+def _are_alike(arrays: Sequence[Array | None]) -> TypeGuard[Sequence[Array]]:
+    """Return True for numbers of the same type and shape in all clips, or for equal facts."""
+    facts = {array and _fact(array) for array in arrays}
+    return None not in facts and len(facts) == 1
+
+
+def _fact(array: Array) -> object:
+    """Everything of an array that all clips have alike."""
+    head = array.head
+    if array.kept:
+        words = None if array.words is None else array.words.tobytes()
+        return head.code, head.shape, words, array.text
+    return head.code, head.shape[1:]
+
+
+def _have_even_rows(arrays: Sequence[Array], counts: Sequence[int]) -> bool:
+    """Return True for as many rows a frame in every clip."""
+    rows = arrays[0].n_rows
+    pairs = zip(arrays, counts, strict=True)
+    return all(array.n_rows * counts[0] == rows * count for array, count in pairs)
+
+
+def _joined(arrays: Sequence[Array]) -> Array:
+    """The array of all clips."""
+    one = arrays[0]
+    if one.kept:
+        return one
+    words = np.concatenate([array.numbers for array in arrays])
+    head = replace(one.head, shape=(len(words), *one.head.shape[1:]))
+    return replace(one, head=head, words=words)
+
+
+def split_clips(motion: Motion) -> dict[str, Motion]:
+    """The clips of a library of motions, such as a pickle of several, by their names.
+
+    Each has its own frames, numbered from 1, and no source. Raises OptionError for any other
+    motion.
+    """
+    try:
+        clips = json.loads(motion.metadata[CLIPS])
+        spans = {str(name): (int(first), int(last)) for name, (first, last) in clips.items()}
+    except (KeyError, ValueError, TypeError, AttributeError, RecursionError, OverflowError):
+        raise OptionError(f"motion {motion.name!r} is no library of clips") from None
+    numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
+    metadata = {key: value for key, value in motion.metadata.items() if key != CLIPS}
+    parts = {}
+    for name, (first, last) in spans.items():
+        start, stop = np.searchsorted(numbers, (first, last + 1)).tolist()
+        part = replace(motion[start:stop], source=None, frame_numbers=None, first_time=None)
+        parts[name] = replace(part, name=name, metadata={CLIP: name} | metadata)
+    return parts
