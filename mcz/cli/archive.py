@@ -253,10 +253,16 @@ def unpack_command(
     return print_file_results(report, folder, as_json)
 
 
-@click.command(short_help="Write every clip in another format: NPZ, CSV, BVH, AMC, C3D, GLB, USD.")
+@click.command(short_help="Write every clip in another format: NPZ, CSV, BVH, C3D, GLB, BIDS, ...")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
-@click.option("--to", "target", type=click.Choice(TARGETS), required=True, help="Set the format.")
+@click.option(
+    "--to",
+    "target",
+    type=click.Choice((*TARGETS, "bids")),
+    required=True,
+    help="Set the format; bids makes a data set of Motion-BIDS.",
+)
 @clips_option
 @where_option
 @rate_option()

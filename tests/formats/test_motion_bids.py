@@ -118,3 +118,77 @@ def test_side_files_name_columns_that_look_like_a_robot(tmp_path: Path) -> None:
     motion = mcz.read(path)
     assert motion.skeleton.joint_names[0] == "angle 0"
     assert not {"x-robot", "source-note"} & motion.metadata.keys()
+
+
+def exported(motion: mcz.Motion, folder: Path) -> mcz.Motion:
+    """``motion`` as BIDS, read again."""
+    mcz.write(motion, folder / "one.mcz")
+    report = mcz.export(folder / "one.mcz", folder / "out", "bids")
+    assert not report.failures
+    (table,) = (folder / "out").glob("sub-*/**/*_motion.tsv")
+    return mcz.read(table)
+
+
+def points_with_gaps() -> mcz.Motion:
+    channels = tuple(map(mcz.Channel, ("tx", "ty", "tz")))
+    joints = (mcz.Joint("toe", channels=channels), mcz.Joint("a\tb", channels=channels))
+    values = np.arange(60.0).reshape(10, 6) / 7
+    mask = np.ones((10, 6), np.bool_)
+    mask[0, :3] = False
+    signal = mcz.Signal(values, mask=mask)
+    skeleton = mcz.Skeleton(joints, unit_cm=0.1)
+    return mcz.Motion(skeleton, (signal,), 120, name="day/walk 2", metadata={"subject": "P-7"})
+
+
+def test_export_and_back(tmp_path: Path) -> None:
+    motion = points_with_gaps()
+    again = exported(motion, tmp_path)
+    assert again.name == "sub-P7_task-daywalk2_tracksys-omc_motion"
+    assert again.skeleton.unit_cm == 0.1 and again.frame_rate == 120
+    assert again.skeleton.joint_names[0] == "toe"
+    np.testing.assert_array_equal(again.signals[0].masked(), motion.signals[0].masked())
+    root = tmp_path / "out"
+    assert (root / "participants.tsv").read_text() == "participant_id\nsub-P7\n"
+    assert json.loads((root / "dataset_description.json").read_text())["Name"] == "out"
+    about = json.loads(next(root.glob("sub-P7/motion/*_motion.json")).read_text())
+    assert about["SamplingFrequency"] == 120 and about["POSChannelCount"] == 6
+    mcz.pack(root, tmp_path / "kept.mcz", keep_all=True)
+    report = mcz.unpack(tmp_path / "kept.mcz", tmp_path / "back")
+    assert len(report.outcomes) == 6 and not report.failures
+
+
+def test_export_of_joints_gaps_and_names(tmp_path: Path) -> None:
+    """Names that BIDS gave are kept; missing frames make a column of times."""
+    kinds = ("tx", "rx", "qw", "")
+    joint = mcz.Joint("hip", channels=(*map(mcz.Channel, kinds[:3]), mcz.Channel("", "f", "N")))
+    name = "sub-01_ses-b_task-run_tracksys-imu_acq-x_run-2_motion"
+    signal = mcz.Signal(np.array([[-0.0, 1e-7, 3, 2.5e17]] * 3))
+    numbers = np.array([1, 2, 5])
+    motion = mcz.Motion(mcz.Skeleton((joint,)), (signal,), 100, name=name, frame_numbers=numbers)
+    again = exported(motion, tmp_path)
+    assert again.name == name
+    assert again.values[:, :4].tobytes() == motion.values.tobytes()
+    np.testing.assert_allclose(again.values[:, 4], [0, 0.01, 0.04], atol=1e-12)
+    (table,) = (tmp_path / "out").glob("sub-01/ses-b/motion/*_channels.tsv")
+    types = [line.split("\t")[1:3] for line in table.read_text().splitlines()[1:]]
+    assert types == [
+        ["x", "POS"],
+        ["x", "JNTANG"],
+        ["quat_w", "ORNT"],
+        ["n/a", "MISC"],
+        ["n/a", "LATENCY"],
+    ]
+
+
+def test_what_bids_does_not_have(tmp_path: Path) -> None:
+    """A clip without a rate, and two clips of one name, fail; the others are written."""
+    joints = (mcz.Joint("a", channels=(mcz.Channel("", "value"),)),)
+    for name, rate in (("x-1", 50), ("x_1", 50), ("y", None)):
+        motion = mcz.Motion(mcz.Skeleton(joints), (mcz.Signal(np.ones((3, 1))),), rate, name=name)
+        mcz.write(motion, tmp_path / f"{name}.mcz")
+    mcz.merge([tmp_path / f"{name}.mcz" for name in ("x-1", "x_1", "y")], tmp_path / "all.mcz")
+    report = mcz.export(tmp_path / "all.mcz", tmp_path / "out", "bids")
+    reasons = [outcome.message for outcome in report.failures]
+    assert ["another clip becomes" in reason for reason in reasons] == [True, False]
+    assert "BIDS requires a frame rate" in reasons[1]
+    assert (tmp_path / "out" / "README").exists()
