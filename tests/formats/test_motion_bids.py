@@ -192,3 +192,17 @@ def test_what_bids_does_not_have(tmp_path: Path) -> None:
     assert ["another clip becomes" in reason for reason in reasons] == [True, False]
     assert "BIDS requires a frame rate" in reasons[1]
     assert (tmp_path / "out" / "README").exists()
+
+
+def test_missing_values_of_bids(tmp_path: Path) -> None:
+    """The first row is a row of the table, too, where a value is missing in it."""
+    path = tmp_path / "sub-1_motion.tsv"
+    path.write_text("1.5\tn/a\n0.25\t2\n3\tn/a\n")
+    motion = mcz.read(path)
+    np.testing.assert_array_equal(
+        motion.signals[0].masked(), [[1.5, np.nan], [0.25, 2], [3, np.nan]]
+    )
+    target = io.BytesIO()
+    mcz.encode(path, target)
+    with mcz.open(target.getvalue()) as file:
+        assert file.only_clip().source_bytes() == path.read_bytes()

@@ -11,7 +11,7 @@ from mcz.sources.text.source import BOM, MOST_CHANNELS, check
 SEPARATORS: tuple[bytes | None, ...] = (b",", b";", b"\t", None)  # None: blanks
 # words for a number that is not there, those of spreadsheets among them
 NO_NUMBER = (
-    *(b"NA", b"N/A", b"null", b"NULL", b"None"),
+    *(b"NA", b"N/A", b"n/a", b"null", b"NULL", b"None"),
     *(b"#N/A", b"#DIV/0!", b"#VALUE!", b"#REF!", b"#NUM!"),
 )
 NOT_THERE = (b"", *NO_NUMBER)
