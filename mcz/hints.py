@@ -9,6 +9,7 @@ from enum import StrEnum
 class Hint(StrEnum):
     """The way out, as a code; ``PYTHON_HINTS`` words it for callers of this package."""
 
+    BLENDER = "blender"
     CONVERT = "convert"
     ENCODE = "encode"
     FEET = "feet"
@@ -34,11 +35,13 @@ class Hint(StrEnum):
     SKELETON = "skeleton"
     UNIT = "unit"
     UP = "up"
+    VERBATIM = "verbatim"
 
 
 Words = Mapping[Hint, str]
 
 PYTHON_HINTS: Words = {
+    Hint.BLENDER: "Blender imports it, and the add-on of MCZ exports it from there",
     Hint.CONVERT: "mcz.convert gives its numbers to another format",
     Hint.ENCODE: "mcz.encode makes one of a source file",
     Hint.FEET: "name the joints of feet (joints=)",
@@ -64,6 +67,7 @@ PYTHON_HINTS: Words = {
     Hint.SKELETON: "skeleton= names one, 'none' does without",
     Hint.UNIT: "give the unit (unit=)",
     Hint.UP: "give the axis (up=)",
+    Hint.VERBATIM: "verbatim=True keeps the file as an attachment",
 }
 
 

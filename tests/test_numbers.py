@@ -378,7 +378,7 @@ def test_tokens_that_are_no_finite_numbers() -> None:
     assert {bits(values)[k] for k in (0, 1, 4, 5)} == {0x7FF8000000000000}
     assert values[[2, 3, 6, 7]].tolist() == [np.inf, -np.inf, np.inf, np.inf]
     assert tokens_of("x", "1.2.3", "-", "e5", "1e", "1e+", "0x10", "1_000", "1").bad().sum() == 8
-    with pytest.raises(SourceError, match="offset 4: b'1,5' is not"):
+    with pytest.raises(SourceError, match="offset 4: '1,5' is not"):
         tokens_of("1.5", "1,5").values()
 
 

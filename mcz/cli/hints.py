@@ -11,6 +11,7 @@ from mcz.model.text_format import counted
 from mcz.model.types import Params
 
 OPTION_HINTS: Words = {
+    Hint.BLENDER: PYTHON_HINTS[Hint.BLENDER],
     Hint.CONVERT: "choose a format with --to",
     Hint.ENCODE: "mcz encode makes one of a source file",
     Hint.FEET: "name the joints of feet (--feet)",
@@ -37,6 +38,7 @@ OPTION_HINTS: Words = {
     Hint.SKELETON: "--skeleton names one, 'none' does without",
     Hint.UNIT: "give the unit (--unit)",
     Hint.UP: "give the axis (--up)",
+    Hint.VERBATIM: "--verbatim keeps the file as an attachment",
 }
 
 

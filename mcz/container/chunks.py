@@ -13,6 +13,7 @@ from enum import Enum, IntFlag
 from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
 from mcz.model.schema import MAX_COUNT
+from mcz.model.text_format import quote
 
 SIGNATURE = b"\x89MCZ\r\n\x1a\n"
 END_MAGIC = b"\x89ZCM\r\n\x1a\n"
@@ -242,6 +243,6 @@ def check_signature_in(data: bytes) -> None:
     if not data:
         raise TruncatedError("the file is empty")
     if data != SIGNATURE[: len(data)]:  # CHUNK-01
-        raise FormatError(f"not an MCZ file: it begins with {data!r}")
+        raise FormatError(f"not an MCZ file: it begins with {quote(data)}")
     if len(data) < len(SIGNATURE):
         raise TruncatedError(f"the file ends at {len(data)}, in its signature")

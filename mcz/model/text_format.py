@@ -29,6 +29,15 @@ def shown(name: str) -> str:
     return _SHORT.repr_str(str(name), 1)
 
 
+def quote(word: str | bytes) -> str:
+    """The start of a word of a source in quotes; bytes are Latin-1.
+
+    >>> quote(b"OFF")
+    "'OFF'"
+    """
+    return repr(word[:40] if isinstance(word, str) else word[:40].decode("latin-1"))
+
+
 def printable(text: str, kept: str = "") -> str:
     r"""``text`` with invisible characters escaped, except those in ``kept``.
 

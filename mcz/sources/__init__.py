@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from mcz.errors import FormatError, SourceError, UnsupportedError
+from mcz.hints import Hint
 from mcz.model.motion import FrameNotes, Source
 from mcz.model.types import JsonObject
 from mcz.sources.text.source import Arriving
@@ -36,6 +37,7 @@ __all__ = [
 ]
 
 HEAD_BYTES = 2**20
+BLENDER_SUFFIXES = (".fbx", ".dae", ".blend", ".glb", ".gltf", ".usd", ".usda", ".usdc")
 _ASF_SECTION = re.compile(rb"(?m)^[ \t]*:(bonedata|hierarchy)\b")
 
 
@@ -211,8 +213,9 @@ def format_of(path: str | Path, data: bytes | None = None) -> Format:
     if own is None:
         known = ", ".join(dict.fromkeys(s for f in FORMATS.values() for s in f.suffixes))
         looks = f"; it looks like {FORMATS[found[0]].suffix}" if found and found[0] != "csv" else ""
-        name = Path(path).name
-        raise SourceError(f"{name}: no source format has the suffix {suffix!r}, but {known}{looks}")
+        hint = Hint.BLENDER if suffix in BLENDER_SUFFIXES else None
+        message = f"no source format has the suffix {suffix!r}, but {known}{looks}"
+        raise SourceError(message, path=path, hint=hint)
     if not found or found[0] == "csv" or any(suffix in FORMATS[n].suffixes for n in found):
         return own
     return FORMATS[found[0]]

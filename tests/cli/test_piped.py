@@ -135,7 +135,7 @@ def test_text_that_breaks_off_leaves_what_was_whole(tmp_path: Path) -> None:
     code, _, errors = run("encode", "-", *STEP, "-o", out, data=data)
     assert code == 1
     assert errors == (
-        "mcz: standard input: line 21: b'x' is not a number; the stream is aborted after 2 frames, "
+        "mcz: standard input: line 21: 'x' is not a number; the stream is aborted after 2 frames, "
         "and has no end\n"
     )
     assert count_frames(out) == 2

@@ -92,9 +92,9 @@ def test_names_may_differ_in_case() -> None:
     [
         (AMC, b"", "no line with a frame number"),
         (AMC, b"\x89PNG\r\n\x1a\n\0\0\0", "no line with a frame number"),
-        (b"back 7 8 -1.5e-014", b"back 7 8", "line 11: 2 values for bone b'back', which has 3"),
-        (b"toe -0.25", b"toe x", "line 10: b'x' is not a number"),
-        (b"toe -0.25", b"root 1 2 3 4 5 6", "line 10: bone b'root' twice in a frame"),
+        (b"back 7 8 -1.5e-014", b"back 7 8", "line 11: 2 values for bone 'back', which has 3"),
+        (b"toe -0.25", b"toe x", "line 10: 'x' is not a number"),
+        (b"toe -0.25", b"root 1 2 3 4 5 6", "line 10: bone 'root' twice in a frame"),
         (b"\n2\n", b"\n" + b"9" * 20 + b"\n", "no frame number or too large"),
     ],
 )

@@ -83,14 +83,14 @@ def test_positions_near_the_offset_replace_it(first: bytes, adds: bool) -> None:
         (b"HIERARCHY\n", b"", "line 1: no HIERARCHY"),
         (b"CHANNELS 1", b"CHANNELS 2", "line 10: CHANNELS 2, but 1"),
         (b"CHANNELS 3", b"CHANNELS 2", "line 5: CHANNELS 2, but more"),
-        (b"CHANNELS 3", b"CHANNELS -3", "line 5: CHANNELS b'-3'"),
-        (b"OFFSET 1.5", b"OFFSET x", "line 8: b'x'"),
-        (b"OFFSET 1.5", b"OFFSET inf", "line 8: b'inf'"),
-        (b"OFFSET 1.5", b"OFFSETS 1.5", "line 8: b'OFFSETS'"),
+        (b"CHANNELS 3", b"CHANNELS -3", "line 5: CHANNELS '-3'"),
+        (b"OFFSET 1.5", b"OFFSET x", "line 8: 'x'"),
+        (b"OFFSET 1.5", b"OFFSET inf", "line 8: 'inf'"),
+        (b"OFFSET 1.5", b"OFFSETS 1.5", "line 8: unexpected 'OFFSETS'"),
         (b"ROOT Hips\n{", b"ROOT Hips\n", "line 4: no { after ROOT"),
         (b"Frames: 3", b"Frame: 3", "line 16: no 'Frames:'"),
         (b"Frame Time:", b"Time:", "line 17: no 'Frame Time:'"),
-        (b"2.20", b"2,20", "line 21: b'2,20' is not a number"),
+        (b"2.20", b"2,20", "line 21: '2,20' is not a number"),
         (b" -4.20\n", b"\n", "line 21: the last frame has 3 of 4 values"),
     ],
 )
@@ -207,7 +207,7 @@ def test_a_byte_order_mark_before_acclaim_hides_nothing(samples: Path) -> None:
     commented = mark + b"# of a program\n" + text
     assert asf.write(asf.read(commented)) == commented
     assert replace(asf.read(commented), source=None) == replace(asf.read(text), source=None)
-    with pytest.raises(SourceError, match="line 1: a byte order mark of UTF-8 hides b':units"):
+    with pytest.raises(SourceError, match="line 1: a byte order mark of UTF-8 hides ':units"):
         asf.read(mark + b":units\n" + text)
     frames = (samples / "walk.amc").read_bytes()
     first = re.search(rb"(?m)^1\s*$", frames)

@@ -125,7 +125,7 @@ REFUSED = {
     b"a,b\nx,y\n": "no row of numbers",
     b"a;b\n1,5;2,5\n": "line 1: the first numbers have decimal commas, which no grid prints; "
     "save the table with points",
-    b"a,b\n1,2\n3,x\n": "line 3: b'x' is not a number",
+    b"a,b\n1,2\n3,x\n": "line 3: 'x' is not a number",
     b"a,b\n1,2\n3,4,5\n": "line 3: more than 2 cells",
     b"Format Version,1.21\n": "no line Frame,Time",
     EULER[: EULER.index(b"10,0.1")]: "line 8: no row of numbers after Frame,Time",
@@ -190,5 +190,5 @@ def test_memory_is_bounded_by_the_bytes_of_a_ragged_table() -> None:
 
 def test_rows_that_are_no_rows_without_blanks() -> None:
     """An empty line is a row of blanks at first, and none where another word is what is missing."""
-    with pytest.raises(SourceError, match="line 3: b'l' is not a number"):
+    with pytest.raises(SourceError, match="line 3: 'l' is not a number"):
         FORMATS["csv"].read(b"5;NA\n5\nl\n\n5;NA\n")

@@ -78,7 +78,7 @@ REFUSED = {
         b"PathFileType\t4\n": "no line that begins with Frame#",
         b"Frame#\tTime\tA\n\t\tX1\n": "line 2: no row of numbers",
         b"Frame#\tTime\tA\n1\t0\t1\t2\t3\nnothing\n": "line 3: not a row of numbers",
-        b"Frame#\tTime\tA\n1\t0\t1\t2\tx\n": "line 2: b'x' is not a number",
+        b"Frame#\tTime\tA\n1\t0\t1\t2\tx\n": "line 2: 'x' is not a number",
         b"Frame#\tTime\tA\n1.5\t0\t1\t2\t3\n": "is no frame number",
         b"\xff\xfeF\0": "UTF-16",
     },

@@ -295,7 +295,7 @@ def test_other_columns_are_no_markers(header: str) -> None:
 REFUSED = {
     b"time;a\n0,0;1,5\n0,1;2,5\n": "decimal commas",
     b"frame;a;b\n1;1,5;x\n2;2,5;y\n": "decimal commas",
-    b'a,b\n"1,5","2"\n"2,5","3"\n': "line 2: b'1,5' has a decimal comma",
+    b'a,b\n"1,5","2"\n"2,5","3"\n': "line 2: '1,5' has a decimal comma",
     MOTIVE.replace(b",", b";").replace(b".", b","): "has a decimal comma",
     VICON.replace(b",", b";").replace(b".", b","): "has a decimal comma",
     b'time,a\n"0,0","1,5"\n"0,1","2,5"\n': "decimal commas",
@@ -304,11 +304,11 @@ REFUSED = {
     b"a,b\r1,2\r3,4\r": "carriage returns",
     b"time,a\r0,1\r1,2\n2,3\n": "line 1: lines end with carriage returns",
     b"time,a\n0,1\r1,2\n2,3\n": "line 2: lines end with carriage returns",
-    b"time,a,b\n0,1,2\n# pause\n1,2,3\n2,3,4\n": "line 3: b'# pause' is not a number",
-    b"0,1,2\n# pause\n1,2,3\n2,3,4\n": "line 2: b'# pause' is not a number",
-    b"time,a,b\n0,1,2\ntime,a,b\n1,2,3\n2,3,4\n": "line 3: b'time' is not a number",
+    b"time,a,b\n0,1,2\n# pause\n1,2,3\n2,3,4\n": "line 3: '# pause' is not a number",
+    b"0,1,2\n# pause\n1,2,3\n2,3,4\n": "line 2: '# pause' is not a number",
+    b"time,a,b\n0,1,2\ntime,a,b\n1,2,3\n2,3,4\n": "line 3: 'time' is not a number",
     b"name,age\nAnn,31\nBob,32\n": "column 'name' is text beside integers",
-    b"time,a\n0,1\n1,error\n2,3\n": "line 3: b'error' is not a number",
+    b"time,a\n0,1\n1,error\n2,3\n": "line 3: 'error' is not a number",
     b"time,label\n0,a\n1,b\n": "no column of numbers beside the times",
 }
 

@@ -121,6 +121,8 @@ class SourceEncoder:
                 result = self._parse(transaction.writer, data, given, progress)
         except (SourceError, MotionError, LimitError) as error:
             if not self.options.verbatim:
+                if isinstance(error, SourceError):
+                    error.add(hint=Hint.VERBATIM)
                 raise
             self.reason, self.remark, self.notes = remark_of(error), "", ()
             with transaction.step():

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
+from mcz.model.text_format import quote
 from mcz.model.types import Bools, Floats, Ints
 
 NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the only NaN in values
@@ -127,7 +128,7 @@ class Tokens:
         if len(bad):
             first = int(bad[0])
             raise SourceError(
-                f"{hard.token(first)[:40]!r} is not a number", offset=hard.start[first]
+                f"{quote(hard.token(first))} is not a number", offset=hard.start[first]
             )
         special = hard.fields[:, 2] & loops.SPECIAL != 0
         texts = zip(hard.texts().tolist(), special.tolist(), strict=True)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from mcz.errors import SourceError
+from mcz.model.text_format import quote
 from mcz.sources.text.source import BOM, MOST_CHANNELS, check
 
 SEPARATORS: tuple[bytes | None, ...] = (b",", b";", b"\t", None)  # None: blanks
@@ -234,7 +235,7 @@ def check_points(cells: Sequence[bytes], line: int) -> None:
     for cell in cells:
         if DECIMAL_COMMA.fullmatch(cell):
             raise SourceError(
-                f"{cell[:40]!r} has a decimal comma, which no grid prints; "
+                f"{quote(cell)} has a decimal comma, which no grid prints; "
                 f"save the table with points",
                 line=line,
             )

@@ -13,6 +13,7 @@ from itertools import islice
 
 from mcz.errors import SourceError
 from mcz.model.skeleton import POSITION_KINDS, QUATERNION_KINDS
+from mcz.model.text_format import quote
 from mcz.sources.tables.csv_files import MAX_COLUMNS
 from mcz.sources.text import MARKUP
 from mcz.sources.text.layout import FRAME_NUMBER
@@ -97,7 +98,9 @@ def first_frame(data: bytes, at: int) -> int:
     while True:
         frame = _FRAME.match(data, at)
         if frame is None:
-            raise SourceError(f"no frame of motion: {data[at : at + 40]!r}", line=line_of(data, at))
+            raise SourceError(
+                f"no frame of motion: {quote(data[at : at + 40])}", line=line_of(data, at)
+            )
         span = _attributes(data, *frame.span(1)).get(TYPE, (0, 0))
         if data[slice(*span)] in NORMAL:
             return at
@@ -154,7 +157,7 @@ def _parts(data: bytes, at: int) -> tuple[list[Part], int]:
     """
     opened = _FRAME.match(data, at)
     if opened is None:
-        raise SourceError(f"no frame: {data[at : at + 40]!r}", line=line_of(data, at))
+        raise SourceError(f"no frame: {quote(data[at : at + 40])}", line=line_of(data, at))
     parts: list[Part] = [
         (name, [span])
         for name, span in _attributes(data, *opened.span(1)).items()
@@ -176,7 +179,7 @@ def _parts(data: bytes, at: int) -> tuple[list[Part], int]:
         at = element.end()
     closed = _CLOSED.match(data, at)
     if closed is None:
-        what = f"{data[at : at + 40].lstrip()!r}"
+        what = quote(data[at : at + 40].lstrip())
         raise SourceError(f"a frame is elements of text, and not {what}", line=line_of(data, at))
     if len({name for name, _ in parts}) < len(parts):
         raise SourceError("a frame has two elements of one name", line=line_of(data, at))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import SourceError
 from mcz.model.numbers import scan
+from mcz.model.text_format import quote
 from mcz.sources.tables.csv_text import BLANK_CELLS, cell_spans
 from mcz.sources.tables.text_columns import TextColumn, odd_cells, refuse_commas, split_text
 from mcz.sources.text import BLANKS, FREE, FULL
@@ -74,7 +75,7 @@ class RowCells:
                 return None
             at = end
         if not (self.free or begins_with_number(line)):
-            raise SourceError(f"not a row of numbers: {line[:40]!r}", line=line_of(self.data, at))
+            raise SourceError(f"not a row of numbers: {quote(line)}", line=line_of(self.data, at))
         tokens: list[Token] = []
         for (start, stop), columns in zip(self._cells(at, line), self.columns, strict=False):
             tokens += self._cell(start, stop, columns)

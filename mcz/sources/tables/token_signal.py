@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mcz.errors import OptionError, SourceError
 from mcz.model.motion import Exceptions, Signal
 from mcz.model.numbers import Grid, GridFlag, Tokens, fit, scan
+from mcz.model.text_format import quote
 from mcz.sources.text.rows import Rows, line_of
 
 Bools = NDArray[np.bool_]
@@ -40,7 +41,7 @@ def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
         first = int(np.flatnonzero(tokens.bad())[0])
         text = tokens.token(first)[:40]
         raise SourceError(
-            f"{text!r} is not a number",
+            f"{quote(text)} is not a number",
             line=line_of(data, int(tokens.start[first])),
             value=text.decode("latin-1"),
         ) from None

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError, SourceError
 from mcz.model.motion import Motion, Skeleton, Source
+from mcz.model.text_format import quote
 from mcz.sources.restore import restore
 from mcz.sources.tables.token_signal import read_signal
 from mcz.sources.text.bones import fit, flat, match_bones, match_names
@@ -125,9 +126,9 @@ class _Frames:
                 tokens.append((start, stop, FRAME_NUMBER))
             else:
                 if not tokens:
-                    raise self._error(start, f"{words[0][0][:40]!r}, not a frame number")
+                    raise self._error(start, f"{quote(words[0][0])}, not a frame number")
                 if words[0][0] in seen:
-                    raise self._error(start, f"bone {words[0][0][:40]!r} twice in a frame")
+                    raise self._error(start, f"bone {quote(words[0][0])} twice in a frame")
                 seen.add(words[0][0])
                 tokens += self._bone(words)
             end = words[-1].end()
@@ -140,7 +141,7 @@ class _Frames:
         if count != self.counts[bone]:
             raise self._error(
                 words[0].start(),
-                f"{count} values for bone {bone[:40]!r}, which has {self.counts[bone]} elsewhere",
+                f"{count} values for bone {quote(bone)}, which has {self.counts[bone]} elsewhere",
             )
         column = self.columns[bone]
         return [(*word.span(), column + k) for k, word in enumerate(words[1:])]
@@ -202,7 +203,7 @@ def _header(source: Lines) -> tuple[bytes, int | None]:
 
 def _frame_number(source: Lines, text: bytes) -> int:
     if len(text) > MOST_DIGITS:
-        raise source.error(f"{text[:40]!r} is too large for a frame number")
+        raise source.error(f"{quote(text)} is too large for a frame number")
     return int(text)
 
 
@@ -241,13 +242,13 @@ class _ArrivingFrames:
     def _add(self, bones: dict[str, list[bytes]], words: list[bytes], done: bool) -> None:
         name = words[0].decode("utf-8", "backslashreplace")
         if name in bones:
-            raise self.source.error(f"bone {name[:40]!r} twice in a frame")
+            raise self.source.error(f"bone {quote(name)} twice in a frame")
         count = None if self._counts is None else self._counts.get(name)
         if done or (self._counts is not None and count is None):
-            raise self.source.error(f"bone {name[:40]!r}, which the first frame does not have")
+            raise self.source.error(f"bone {quote(name)}, which the first frame does not have")
         if count is not None and count != len(words) - 1:
             raise self.source.error(
-                f"{len(words) - 1} values for bone {name[:40]!r}, which has {count} elsewhere"
+                f"{len(words) - 1} values for bone {quote(name)}, which has {count} elsewhere"
             )
         bones[name] = words[1:]
 

@@ -15,6 +15,7 @@ from math import isfinite
 
 from mcz.errors import MotionError, SourceError
 from mcz.model.motion import ORIGIN, Channel, Joint, Skeleton, Vector
+from mcz.model.text_format import quote
 from mcz.sources.text.rows import line_of
 from mcz.sources.text.source import MOST_CHANNELS, MOST_DEPTH, MOST_JOINTS, check, text_start
 
@@ -90,7 +91,7 @@ class _Reader:
             elif self._is_alone(word):
                 self.strays += 1
             else:
-                raise self.error(f"{word[:40]!r} in the HIERARCHY section")
+                raise self.error(f"unexpected {quote(word)} in the HIERARCHY section")
 
     def _is_alone(self, word: bytes) -> bool:
         """Return True if the word just read is alone on its line, and so has no meaning."""
@@ -104,7 +105,7 @@ class _Reader:
         self.at = rest.end()
         node = _Node(rest[0].strip(BLANKS), parent, word == b"END")
         if self.word() != b"{":
-            raise self.error(f"no {{ after {word.decode()} {node.name[:40]!r}")
+            raise self.error(f"no {{ after {word.decode()} {quote(node.name)}")
         if node.end:
             return parent, node
         self.joints.append(node)
@@ -122,13 +123,13 @@ class _Reader:
         except ValueError:
             number = float("nan")
         if not isfinite(number) or b"_" in word:
-            raise self.error(f"{word[:40]!r}, where a number was expected")
+            raise self.error(f"{quote(word)}, where a number was expected")
         return number
 
     def _channels(self) -> Iterator[Channel]:
         count = self.word()
         if not count.isdigit() or len(count) > 9:
-            raise self.error(f"CHANNELS {count[:40]!r}: not a count")
+            raise self.error(f"CHANNELS {quote(count)}: not a count")
         for k in range(int(count)):
             word = self.word()
             known = word.upper() in (

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
+from mcz.model.text_format import quote
 from mcz.sources.text import WORDS, Items
 from mcz.sources.text.layout import (
     FRAME_NUMBER,
@@ -255,7 +256,7 @@ class _Reader:
     def _number(self, token: bytes) -> None:
         number = int(token) if FRAME_NUMBER_TEXT.fullmatch(token) else MAX_NUMBER
         if abs(number) >= MAX_NUMBER:
-            raise SourceError(f"frame {self.row}: {token[:40]!r} is no frame number or too large")
+            raise SourceError(f"frame {self.row}: {quote(token)} is no frame number or too large")
         self.numbers[self.row] = number
         if token != b"%d" % number:
             self.number_texts.append((self.row, token))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mcz.errors import SourceError
 from mcz.model.motion import Skeleton, Source
 from mcz.model.numbers import values_of_texts
+from mcz.model.text_format import quote
 from mcz.sources.text.layout import Layout
 from mcz.sources.text.rows import Rows
 
@@ -67,7 +68,7 @@ def check_first_line(data: bytes, ignored: tuple[bytes, ...]) -> None:
     line = data[len(BOM) :].split(b"\n", 1)[0].strip().lower()
     if data.startswith(BOM) and line and not line.startswith(ignored):
         raise SourceError(
-            f"a byte order mark of UTF-8 hides {line[:40]!r}; save the file without it", line=1
+            f"a byte order mark of UTF-8 hides {quote(line)}; save the file without it", line=1
         )
 
 
@@ -139,5 +140,5 @@ class Lines:
         """The values of the words of the last line, or of those that end with it."""
         values, bad = values_of_texts(texts)
         if bad.any():
-            raise self.error(f"{texts[int(np.argmax(bad))][:40]!r} is not a number")
+            raise self.error(f"{quote(texts[int(np.argmax(bad))])} is not a number")
         return values

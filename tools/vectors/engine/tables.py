@@ -20,7 +20,7 @@ from tools.vectors.engine.edits import edit_file
 FOLDER = Path(__file__).parent.parent / "tables"
 HEAD = {"folder", "spec", "base", "file", "rules", "also", "modes", "exit", "edit"} | CLIP_KEYS
 ROW = {"purpose", "spec", "rules", "also", "fault", "base", "file", "edit"} | CLIP_KEYS | {
-    "exit", "modes", "parts", "holds", "since", "clips",
+    "exit", "modes", "parts", "holds", "since", "clips", "crafted",
 }  # fmt: skip
 Arrays = tuple[tuple[dict[str, Any], bytes], ...]
 DECODED = "decoded"  # what a file holds whose row says it with edits
@@ -88,12 +88,6 @@ class Row:
         """
         return bool({"segments", "clips"} & set(self.fields))
 
-    @property
-    def is_crafted(self) -> bool:
-        """True where no program but this one wrote what the file restores."""
-        made = self.has_segments or bool(self.fields.get("edit"))
-        return made or str(self.fields["base"]).startswith("by_hand")
-
     def vector(self) -> Vector:
         """The file, and what a decoder must make of it."""
         fields = self.fields
@@ -123,7 +117,7 @@ class Row:
                 for text in fields.get("parts", ())
             ),
             since=fields.get("since", FORMAT_NAME),
-            is_crafted="sources" in modes and OK in exit_ and self.is_crafted,
+            is_crafted=bool(fields.get("crafted")),
         )
 
 
