@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 VECTORS = HERE / "vectors"
 GROUPS = ("valid", "uncommon", "invalid")
 FORMATS = ("asf", "amc", "bvh", "c3d", "c3d-outputs", "trc", "mot", "sto", "motive", "vicon", "csv")
-FORMATS += ("npy", "npz", "pickle", "mvnx")
+FORMATS += ("npy", "npz", "pickle", "torch", "mvnx")
 MAX_LINE = 2**20  # bytes of the JSON line
 SPARE_OUTPUT = 2**25  # bytes that an answer may have beyond what is expected
 # Classes of SPEC.md, "Classes of conformance": the codecs of each, None for all.

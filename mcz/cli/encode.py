@@ -59,7 +59,21 @@ if TYPE_CHECKING:
     "--format",
     "format_name",
     type=click.Choice(
-        ("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "mvnx", "npy", "npz", "pickle")
+        (
+            "bvh",
+            "amc",
+            "c3d",
+            "asf",
+            "trc",
+            "mot",
+            "sto",
+            "csv",
+            "mvnx",
+            "npy",
+            "npz",
+            "pickle",
+            "torch",
+        )
     ),
     help="Set the format of standard input. Default: detect it from the content; for live input "
     "BVH, or AMC with --skeleton.",

@@ -187,15 +187,21 @@ FORMATS: dict[str, Format] = {
                 (13, "npz", ("arrays.header", "is_motion")),
             )
         ),
-        Format(
-            "pickle",
-            14,
-            (".pkl", ".pickle", ".joblib"),
-            _of("arrays.read", "read_pickle_file"),
-            _of("arrays.read", "write_arrays"),
-            states_rate=True,
-            is_motion=_of("arrays.pickles", "is_motion"),
-            arrays=_of("arrays.pickles", "list_arrays"),
+        *(
+            Format(
+                name,
+                format_id,
+                suffixes,
+                _of("arrays.read", read),
+                _of("arrays.read", "write_arrays"),
+                states_rate=True,
+                is_motion=_of("arrays.pickles", is_motion),
+                arrays=_of("arrays.pickles", "list_arrays"),
+            )
+            for format_id, name, suffixes, read, is_motion in (
+                (14, "pickle", (".pkl", ".pickle", ".joblib"), "read_pickle_file", "is_motion"),
+                (17, "torch", (".pt", ".pth"), "read_torch", "is_tensor_motion"),
+            )
         ),
     )
 }
@@ -250,7 +256,7 @@ def likely_formats(data: bytes) -> tuple[str, ...]:
     if head.startswith(b"\x93NUMPY"):
         return ("npy",)
     if head.startswith(b"PK\3\4"):
-        return ("npz",)
+        return ("torch",) if b"/data.pkl" in head[:256] else ("npz",)
     if head[:1] == b"\x80" and head[1:2] in (b"\2", b"\3", b"\4", b"\5"):
         return ("pickle",)
     start = head.removeprefix(b"\xef\xbb\xbf").lstrip()[:16].upper()

@@ -8,7 +8,9 @@ import pickle
 import struct
 import subprocess
 import tracemalloc
+import zipfile
 from collections import OrderedDict
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,7 @@ from mcz.model.motion import Motion
 from mcz.sources import FORMATS, arrays_of, format_of, likely_formats
 from tests.formats.saved_arrays import arrays
 from tools.vectors.build.array_files import floats
-from tools.vectors.build.pickle_files import joblib_file
+from tools.vectors.build.pickle_files import joblib_file, tensor_file
 
 PLAIN = (3, 4, 5)  # protocols that write bytes as they are
 BODIES = ["pelvis", "left_hip_link", "right_hip_link"]
@@ -450,3 +452,61 @@ def test_spliced_files_are_restored_or_refused(data: st.DataObject) -> None:
 def test_opcodes_are_bounded() -> None:
     with pytest.raises(SourceError, match="more than 1048576 opcodes"):
         read(b"N" * 2**21 + b".")
+
+
+def read_tensors(data: bytes) -> Motion:
+    motion: Motion = FORMATS["torch"].read(data, "walk")
+    assert FORMATS["torch"].write(motion) == data
+    return motion
+
+
+def test_a_file_of_torch() -> None:
+    array = floats(40, 2, 3).astype("<f4")
+    data = tensor_file(array)
+    motion = read_tensors(data)
+    np.testing.assert_array_equal(motion.values, array.reshape(40, 6))
+    assert motion.frame_rate == 30 and likely_formats(data) == ("torch",)
+    assert format_of("a.pth").name == "torch" and FORMATS["torch"].is_motion is not None
+    assert FORMATS["torch"].is_motion(data)
+    out = io.BytesIO()
+    mcz.write(motion, out)
+    with mcz.open(out.getvalue()) as file:
+        part = file.only_clip().source_bytes((3, 8))
+    np.testing.assert_array_equal(read_tensors(part).values, array.reshape(40, 6)[3:8])
+    assert part.count(b"K\x1eM") == 0 and b"cpuK\x1e" in part  # 5 x 2 x 3 numbers
+    listed = arrays_of(motion.source, ["motion"]) or []
+    assert [row["name"] for row in listed] == ["dof_pos"]
+    with zipfile.ZipFile(io.BytesIO(part)) as archive:
+        assert archive.testzip() is None
+
+
+def test_files_of_torch_by_torch() -> None:
+    torch = pytest.importorskip("torch")
+    x = torch.arange(60.0).reshape(20, 3)
+    tensors = {"dof_pos": torch.rand(20, 7), "x": x, "view": x[2:9], "half": x.half(), "fps": 50}
+    buffer = io.BytesIO()
+    torch.save(tensors, buffer)
+    motion = read_tensors(buffer.getvalue())
+    assert [signal.name for signal in motion.signals] == ["motion", "half"]
+    assert "x is a view of a storage" in motion.metadata["source-note"]
+    out = io.BytesIO()
+    mcz.write(motion, out)
+    with mcz.open(out.getvalue()) as file:
+        part = torch.load(io.BytesIO(file.only_clip().source_bytes((3, 8))))
+    assert torch.equal(part["dof_pos"], tensors["dof_pos"][3:8]) and torch.equal(part["x"], x)
+
+
+def test_files_of_torch_that_are_refused() -> None:
+    with pytest.raises(SourceError, match="torch before 1.6"):
+        read_tensors(b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19.")
+    with pytest.raises(SourceError, match="a ZIP that has data.pkl"):
+        read_tensors(b"none")
+    data = tensor_file(floats(4, 2).astype("<f4"))
+    with pytest.raises(SourceError, match="'posix.FloatStorage' is no part of an array"):
+        read_tensors(data.replace(b"ctorch\nFloat", b"cposix\nFloat"))
+    with pytest.raises(SourceError, match="'torch._utils._rebuild_tensor_v2' is no part"):
+        read(b"\x80\2ctorch._utils\n_rebuild_tensor_v2\n.")
+    for at in range(len(data)):
+        for changed in (data[:at] + bytes((data[at] ^ 0x81,)) + data[at + 1 :], data[:at]):
+            with suppress(mcz.SourceError, mcz.LimitError):
+                read_tensors(changed)

@@ -24,6 +24,7 @@ from tools.fuzz.guard import hold
 from tools.fuzz.seeds import sources
 from tools.vectors.build import table_files
 from tools.vectors.build.mvnx_files import MvnxFile
+from tools.vectors.build.pickle_files import tensor_file
 
 FRAMES = 3  # of a sample, as a seed
 STORED = 3  # one of so many motions that are read is stored, too, which takes long
@@ -52,6 +53,7 @@ WORDS = {
         "poses.npy trans.npy root_orient.npy times.npy mocap_framerate.npy "
         "\\xff\\xff\\xff\\xff \\x01\\x00\\x10\\x00"
     ),
+    "torch": "PK\\x03\\x04 PK\\x01\\x02 ctorch._utils\\x0a_rebuild_tensor_v2\\x0a FloatStorage Q",
     "pickle": (
         "\\x80\\x04 \\x8c\\x05numpy ccopyreg _reconstruct\\x0a NumpyArrayWrapper dof_pos fps "
         "C\\x10 K\\x03 \\x85 \\x86 \\x94 R b h\\x01 ( t }( u ] e \\x93 "
@@ -100,7 +102,7 @@ def seeds(name: str) -> dict[str, bytes]:
 
 
 def _sample(name: str) -> bytes:
-    if name in ("npy", "npz", "pickle"):
+    if name in ("npy", "npz", "pickle", "torch"):
         return _array_sample(name)
     if name == "asf":
         return asf.write(acclaim_walk().skeleton)
@@ -122,6 +124,8 @@ def _array_sample(name: str) -> bytes:
         np.save(buffer, numbers)
     elif name == "pickle":
         pickle.dump({"dof_pos": numbers, "fps": 30}, buffer, protocol=4)
+    elif name == "torch":
+        buffer.write(tensor_file(numbers.astype("<f4")))
     else:
         np.savez(buffer, poses=numbers, fps=30, times=np.arange(FRAMES) / 30)
     return buffer.getvalue()
@@ -137,6 +141,10 @@ def check_npz(data: bytes) -> bool:
 
 def check_pickle(data: bytes) -> bool:
     return _check("pickle", data)
+
+
+def check_torch(data: bytes) -> bool:
+    return _check("torch", data)
 
 
 def check_bvh(data: bytes) -> bool:

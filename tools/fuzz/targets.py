@@ -85,6 +85,7 @@ TARGETS: dict[str, Target] = {
         _reader("npy", readers.check_npy),
         _reader("npz", readers.check_npz),
         _reader("pickle", readers.check_pickle),
+        _reader("torch", readers.check_torch),
         Target(
             "mcz",
             "whole files: strict, in parts, salvaged, live, verified",

@@ -30,6 +30,7 @@ const SOURCE_FORMATS = new Map([
   [13, { name: "npz", of: "clip", kind: "arrays" }],
   [14, { name: "pickle", of: "clip", kind: "arrays" }],
   [16, { name: "mvnx", of: "clip", kind: "table" }],
+  [17, { name: "torch", of: "clip", kind: "arrays" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */

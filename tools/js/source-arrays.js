@@ -18,6 +18,7 @@ const DEFLATE = 7;
 const ROWS = 8;
 const SIZE1 = 9;
 const PART = 10;
+const ITEMS = 11;
 /** Bytes of the kinds that follow from other pieces. */
 const SIZES = { [CRC]: 4, [SIZE4]: 4, [SIZE8]: 8, [SIZE1]: 1 };
 
@@ -99,7 +100,7 @@ function placeRows(pieces, signals, numbers, nFrames) {
       if (piece.start > piece.stop) throw new Refused("arrays: a PART that ends before it begins");
       part = [piece.start, piece.stop].map((number) => countBefore(number, numbers, nFrames));
     }
-    if (![COUNT, DATA, ROWS].includes(piece.kind)) continue;
+    if (![COUNT, DATA, ROWS, ITEMS].includes(piece.kind)) continue;
     const decoded = signals[piece.signal];
     if (!decoded) throw new Refused(`arrays: signal ${piece.signal} of ${signals.length}`);
     const [first, stop] = part ?? [0, nFrames];
@@ -186,6 +187,8 @@ function readPiece(reader, left) {
       return readData(reader, left);
     case ROWS:
       return readRows(reader);
+    case ITEMS:
+      return { ...readRows(reader), kind: ITEMS, factor: reader.varint() };
     case CRC:
     case SIZE4:
     case SIZE8:
@@ -260,7 +263,7 @@ function sizeOf(piece, signals) {
   if (kind === TEXT || kind === OWN || kind === DEFLATE) return piece.text.length;
   if (kind in SIZES) return SIZES[kind];
   if (kind === PART) return 0;
-  if (kind === COUNT || kind === ROWS) return piece.size;
+  if (kind === COUNT || kind === ROWS || kind === ITEMS) return piece.size;
   const decoded = signals[piece.signal];
   let nColumns = 0;
   for (const { channel, nChannels } of piece.runs) {
@@ -288,6 +291,8 @@ function put(out, view, starts, piece, at, signals) {
     putNumbers(view, at, piece, signals[piece.signal]);
   } else if (kind === ROWS) {
     putRows(view, at, piece.size, piece.nRows);
+  } else if (kind === ITEMS) {
+    putRows(view, at, piece.size, piece.nRows * piece.factor);
   } else if (kind !== CRC && kind !== PART) {
     const size = starts[piece.stop] - starts[piece.start];
     const width = SIZES[kind];

@@ -17,6 +17,7 @@ UNTIMED = (
     "npy",
     "npz",
     "pickle",
+    "torch",
 )  # with neither times, unless in an array, nor frame numbers
 
 

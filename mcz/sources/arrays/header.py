@@ -36,8 +36,9 @@ class Head:
 
     ``code`` is NumPy's without byte order, such as "f8"; "O" of pickled objects. ``rows_at`` and
     ``end`` are where the length of the first axis is printed, and where the text ends that may
-    follow it, without the blanks behind; unless ``is_printed``, it is an integer there. A fault of
-    the head is ``odd``, and there is no more then.
+    follow it, without the blanks behind; unless ``is_printed``, it is an integer there, and the
+    number of all numbers one at ``items_at``. A fault of the head is ``odd``, and there is no more
+    then.
     """
 
     start: int = 0
@@ -49,6 +50,7 @@ class Head:
     end: int = 0
     odd: str = ""
     is_printed: bool = True
+    items_at: tuple[int, int] = (0, 0)
 
     @property
     def is_number(self) -> bool:

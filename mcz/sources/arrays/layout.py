@@ -38,13 +38,16 @@ class Kind(IntEnum):
     DEFLATE = 7  # the deflate stream of other pieces
     ROWS = 8  # the number of rows, an integer
     SIZE1 = 9  # how many bytes other pieces have, u8
+    ITEMS = 11  # the number of rows times ``start``, an integer
     PART = 10  # no bytes: pieces after it are of some of the frames
 
 
 SIZES = {Kind.SIZE1: 1, Kind.CRC: 4, Kind.SIZE4: 4, Kind.SIZE8: 8}  # bytes of these kinds
 OF_PIECES = (*SIZES, Kind.DEFLATE)
+_OF_START = (*OF_PIECES, Kind.PART, Kind.ITEMS)
 _OF_SPAN = (*OF_PIECES, Kind.PART)
-_OF_ROWS = (Kind.COUNT, Kind.DATA, Kind.ROWS)
+INTEGERS = (Kind.ROWS, Kind.ITEMS)
+_OF_ROWS = (Kind.COUNT, Kind.DATA, *INTEGERS)
 _OF_DETAIL = (Kind.OWN, Kind.DEFLATE)
 _OF_CONTENTS = (Kind.TEXT, Kind.OWN, *_OF_ROWS)
 
@@ -69,12 +72,12 @@ class ArrayPiece(Record):
     kind: int = field(one_of(Int8ul, tuple(Kind)), "what the piece is")  # ARRAY-01
     text: bytes | None = field(_if((Kind.TEXT,), SIZED), "TEXT only: the bytes")
     signal: int | None = field(
-        _if(_OF_ROWS, UVARINT), "COUNT, DATA and ROWS only: index of the signal"
+        _if(_OF_ROWS, UVARINT), "COUNT, DATA, ROWS and ITEMS only: index of the signal"
     )
     after: bytes | None = field(_if((Kind.COUNT,), SIZED), "COUNT only: what follows the number")
     size: int | None = field(
-        _if((Kind.COUNT, Kind.ROWS), UVARINT),
-        "COUNT and ROWS only: bytes, those of blanks included",
+        _if((Kind.COUNT, *INTEGERS), UVARINT),
+        "COUNT, ROWS and ITEMS only: bytes, those of blanks included",
     )
     type: int | None = field(
         _if((Kind.DATA,), one_of(Int8ul, tuple(range(len(TYPES))))), "DATA only: type of a number"
@@ -87,9 +90,12 @@ class ArrayPiece(Record):
         _if((Kind.DATA,), counted(ArrayRun, kind="runs")), "DATA only: its columns, in order"
     )
     start: int | None = field(
-        _if(_OF_SPAN, UVARINT), "CRC, SIZE and DEFLATE: first piece; PART: first frame number"
+        _if(_OF_START, UVARINT),
+        "CRC, SIZE and DEFLATE: first piece; PART: first frame number; ITEMS: factor",
     )
-    stop: int | None = field(_if(_OF_SPAN, UVARINT), "what comes after the last of these")
+    stop: int | None = field(
+        _if(_OF_SPAN, UVARINT), "CRC, SIZE, DEFLATE and PART only: after the last of these"
+    )
 
 
 class ArrayTemplate(Record):

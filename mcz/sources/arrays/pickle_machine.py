@@ -8,7 +8,8 @@ table of the opcodes.
 from __future__ import annotations
 
 import pickletools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from math import prod
 from typing import NoReturn
 
 from mcz.errors import SourceError
@@ -17,8 +18,10 @@ from mcz.sources.arrays.pickle_values import (
     Dict,
     DType,
     Name,
+    Number,
     PickledArray,
     Raw,
+    Storage,
     Wrapper,
     integer_of,
     size_of,
@@ -48,16 +51,41 @@ _MODULES = {
     "_codecs": ("encode",),
 }
 NAMES = {f"{module}.{name}": Name(name) for module, names in _MODULES.items() for name in names}
+STORAGES = {
+    "BoolStorage": "b1",
+    "CharStorage": "i1",
+    "ShortStorage": "i2",
+    "IntStorage": "i4",
+    "LongStorage": "i8",
+    "ByteStorage": "u1",
+    "HalfStorage": "f2",
+    "FloatStorage": "f4",
+    "DoubleStorage": "f8",
+    "BFloat16Storage": "bfloat16",
+}
+TENSORS = {f"torch.{name}": Name(name) for name in STORAGES}
+TENSORS["torch._utils._rebuild_tensor_v2"] = Name("_rebuild_tensor_v2")
+VIEW = "a view of a storage, or one of several tensors of it"
 
 
 class Machine:
     """The pickle in ``data`` from ``at`` on; ``at`` moves behind it.
 
-    ``frames`` are the frames of protocol 4: offset of the length, start and stop.
+    ``frames`` are the frames of protocol 4: offset of the length, start and stop. ``storages`` are
+    those of tensors by their key, in the byte order ``order``; None: there are no tensors.
     """
 
-    def __init__(self, data: bytes, at: int = 0) -> None:
+    def __init__(
+        self,
+        data: bytes,
+        at: int = 0,
+        storages: Mapping[str, Raw] | None = None,
+        order: str = "<",
+    ) -> None:
         self.data, self.at = data, at
+        self.storages, self.order = storages, order
+        self.tensors: dict[Raw, list[PickledArray]] = {}  # by storage
+        self.names = NAMES if storages is None else NAMES | TENSORS
         self.stack: list[object] = []
         self.marks: list[int] = []
         self.memo: dict[int, object] = {}
@@ -178,10 +206,10 @@ class Machine:
 
     def push_name(self, module: object, name: object) -> None:
         full = f"{self.text_of(module)}.{self.text_of(name)}"
-        if full not in NAMES:
+        if full not in self.names:
             self.is_foreign = True
             self.refuse(f"{full[:200]!r} is no part of an array, and is never called")
-        self.stack.append(NAMES[full])
+        self.stack.append(self.names[full])
 
     def call(self) -> None:
         """REDUCE: what the few known functions would make of their arguments."""
@@ -203,6 +231,10 @@ class Machine:
                 made = DType(str(self.text_of(code)))
             case "OrderedDict", ():
                 made = Dict()
+            case "_rebuild_tensor_v2", (Storage() as storage, offset, tuple(), tuple(), *_):
+                made = _tensor(storage, integer_of(offset), *arguments[2:4])
+                if storage.content is not None:
+                    self.tensors.setdefault(storage.content, []).append(made)
             case "encode", (str(), *_):
                 made = None  # bytes, written as text
             case _:
@@ -215,6 +247,15 @@ class Machine:
         if of_class != NAMES["joblib.numpy_pickle.NumpyArrayWrapper"] or arguments != ():
             self.refuse("an object of a class, which is never made")
         self.stack.append(Wrapper())
+
+    def push_storage(self) -> None:
+        """BINPERSID: only a storage of torch."""
+        match self.pop():
+            case ("storage", Name(name), key, _, items) if self.storages and name in STORAGES:
+                content = self.storages.get(self.text_of(key) or "")
+                self.stack.append(Storage(DType(STORAGES[name], self.order), content, items))
+            case _:
+                self.refuse("BINPERSID makes an object of a program, and is never obeyed")
 
     def build(self) -> None:
         """BUILD: the state of a type, of an array, or of joblib's wrapper."""
@@ -256,6 +297,19 @@ class Machine:
         array.content = Raw(start, start + size, 0)
         self.at = start + size
         return array
+
+
+def _tensor(
+    storage: Storage, offset: int, shape: tuple[object, ...], strides: tuple[object, ...]
+) -> PickledArray:
+    """The array of a tensor, which has all numbers of its storage in order."""
+    array = PickledArray(shape, storage.dtype, fault=VIEW)
+    lengths = array.lengths
+    plain = [prod(lengths[k + 1 :]) for k in range(len(lengths))]
+    is_whole = offset == 0 and size_of(lengths, 1) == integer_of(storage.items)
+    if is_whole and [*map(integer_of, strides)] == plain and isinstance(storage.items, Number):
+        array.content, array.items = storage.content, storage.items
+    return array
 
 
 def _push_tuple(m: Machine, n: int) -> None:
@@ -325,6 +379,7 @@ OPERATIONS: dict[str, Callable[[Machine, int, int], None]] = {
     "GLOBAL": _push_line_names,
     "STACK_GLOBAL": lambda m, a, b: _push_stack_names(m),
     "REDUCE": lambda m, a, b: m.call(),
+    "BINPERSID": lambda m, a, b: m.push_storage(),
     "NEWOBJ": lambda m, a, b: m.make_object(),
     "BUILD": lambda m, a, b: m.build(),
 }

@@ -49,13 +49,17 @@ class DType:
 
 @dataclass(slots=True, eq=False)
 class PickledArray:
-    """An array: ``content`` is Raw, the list of its objects, or None with a ``fault``."""
+    """An array: ``content`` is Raw, the list of its objects, or None with a ``fault``.
+
+    ``items`` is how many numbers a tensor has, where the pickle states that.
+    """
 
     shape: tuple[object, ...] = ()
     dtype: DType | None = None
     by_columns: bool = False
     content: Raw | list[object] | None = None
     fault: str = ""
+    items: Number | None = None
 
     @property
     def lengths(self) -> tuple[int, ...]:
@@ -68,6 +72,15 @@ class Name:
     """A name that a pickle may use, without its module."""
 
     name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Storage:
+    """The numbers of a tensor: their type, their bytes, and how many the pickle says they are."""
+
+    dtype: DType
+    content: Raw | None
+    items: object
 
 
 class Wrapper:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 
 import numpy as np
@@ -16,11 +16,13 @@ import numpy as np
 from mcz.errors import SourceError
 from mcz.model.motion import Source
 from mcz.model.types import JsonObject
-from mcz.sources.arrays.archive import Archive, Field
+from mcz.sources.arrays.archive import Archive, Field, read_archive
 from mcz.sources.arrays.columns import MAX_TEXT, Array, array_of
 from mcz.sources.arrays.header import MAGIC, Head, read_head
 from mcz.sources.arrays.header import is_motion as is_array_motion
 from mcz.sources.arrays.layout import (
+    INTEGERS,
+    LOCAL,
     SIZES,
     TYPES,
     Kind,
@@ -53,6 +55,11 @@ MAX_ARRAYS, MAX_FACTS = 2**15, 256  # of a file, of a clip
 SEPARATOR = "/"
 
 
+OLD_TORCH = (
+    "a file of torch before 1.6, which is no ZIP; where you trust it, write it anew in Python: "
+    "torch.save(torch.load(path), path)"
+)
+NO_TORCH = "no file of torch.save: a ZIP that has data.pkl, not compressed"
 NESTS = (Dict, list, tuple, PickledArray)
 
 
@@ -79,16 +86,48 @@ def read_pickle(data: bytes, at: int = 0) -> Pickle:
                 "joblib.dump(joblib.load(path), path)",
                 offset=at,
             )
-    machine = Machine(data, at)
+    pickle = _read_machine(machine := Machine(data, at))
+    rest = len(data) - machine.at
+    return replace(pickle, notes=(f"{rest} bytes follow the pickle",)) if rest else pickle
+
+
+def read_tensors(data: bytes) -> Pickle:
+    """The arrays in a file of torch.save, a ZIP; raises SourceError with the offset."""
+    if not data.startswith(LOCAL):
+        raise SourceError(OLD_TORCH if data.startswith(b"\x80") else NO_TORCH, offset=0)
+    archive = read_archive(data)
+    members = {m.name.partition("/")[2]: m for m in archive.members if m.is_stored}
+    pickle = members.get("data.pkl")
+    if pickle is None:
+        raise SourceError(NO_TORCH, offset=0)
+    order = members.get("byteorder")
+    is_big = order is not None and data[order.start : order.stop] == b"big"
+    storages = {
+        name.removeprefix("data/"): Raw(m.start, m.stop, 0)
+        for name, m in members.items()
+        if name.startswith("data/")
+    }
+    machine = Machine(data, pickle.start, storages, ">" if is_big else "<")
+    own = _read_machine(machine)
+    if machine.at > pickle.stop:
+        raise SourceError("the pickle runs past its end", offset=pickle.stop)
+    fields = sorted((*archive.fields, *own.archive.fields), key=lambda field: field.at)
+    return replace(own, archive=replace(archive, fields=tuple(fields)))
+
+
+def _read_machine(machine: Machine) -> Pickle:
+    """The arrays of a pickle, which is run to its end."""
+    data = machine.data
     root, clip = _single_clip(machine, machine.run())
+    for shared in filter(lambda tensors: len(tensors) > 1, machine.tensors.values()):
+        for tensor in shared:
+            tensor.content = None
     reader = _Reader(machine, _clips(machine, root))
     arrays, fields = reader.read(root)
     fields += [Field(field, Kind.SIZE8, start, stop) for field, start, stop in machine.frames]
-    rest = len(data) - machine.at
-    notes = (f"{rest} bytes follow the pickle",) if rest else ()
     fields.sort(key=lambda field: field.at)
     archive = Archive(data, len(data), fields=tuple(fields))
-    return Pickle(arrays, archive, clip, notes, reader.members)
+    return Pickle(arrays, archive, clip, clips=reader.members)
 
 
 def _children(machine: Machine, node: object) -> list[tuple[str, object]]:
@@ -230,8 +269,10 @@ class _Reader:
         self.used |= places
         rows_at = (rows.at, rows.at + rows.size) if isinstance(rows, Number) else (0, 0)
         is_big = order == ">"
-        head = Head(raw.start, shape, code, is_big, node.by_columns, rows_at, is_printed=False)
-        return head, ""
+        items = node.items
+        items_at = (items.at, items.at + items.size) if items is not None else (0, 0)
+        head = Head(raw.start, shape, code, is_big, node.by_columns, rows_at)
+        return replace(head, is_printed=False, items_at=items_at), ""
 
     def _add_words(self, name: str, node: object) -> bool:
         """Add a list of texts, such as names of joints; returns False for anything else."""
@@ -285,13 +326,16 @@ def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
     if source.format == "npy" and all(piece.kind != Kind.ROWS for piece in pieces):
         return list_plain(source, signals)
     sizes = [
-        piece.size if piece.kind == Kind.ROWS else SIZES.get(piece.kind, len(piece.text))
+        piece.size if piece.kind in INTEGERS else SIZES.get(piece.kind, len(piece.text))
         for piece in pieces
     ]
     starts = [0, *accumulate(sizes)]
     data = b"".join(_empty(piece, starts, size) for piece, size in zip(pieces, sizes, strict=True))
     try:
-        pickle = (npy_objects(data) if source.format == "npy" else None) or read_pickle(data)
+        if source.format == "torch":
+            pickle = read_tensors(data)
+        else:
+            pickle = (npy_objects(data) if source.format == "npy" else None) or read_pickle(data)
         names = {a.head.start: a.name for a in pickle.arrays if a.head.start}
     except SourceError:
         names = {}  # a template that no pickle made
@@ -327,3 +371,8 @@ def is_motion(data: bytes, at: int = 0) -> bool:
     with suppress(SourceError):
         machine.run()
     return b"numpy" in data and not machine.is_foreign
+
+
+def is_tensor_motion(data: bytes) -> bool:
+    """Return True if a file of torch.save that begins with ``data`` may be no model."""
+    return b"_rebuild_tensor_v2" in data and b"_rebuild_parameter" not in data

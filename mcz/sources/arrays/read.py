@@ -18,7 +18,7 @@ from mcz.sources.arrays.deflate import is_kept
 from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Kind, Piece, build_arrays
 from mcz.sources.arrays.libraries import CLIP, Library, join_clips
 from mcz.sources.arrays.meaning import Meaning, meaning_of
-from mcz.sources.arrays.pickles import Pickle, npy_objects, read_pickle
+from mcz.sources.arrays.pickles import Pickle, npy_objects, read_pickle, read_tensors
 from mcz.sources.arrays.restore import Placed, pieces_of, restore_arrays
 
 
@@ -40,6 +40,14 @@ def read_pickle_file(data: bytes, name: str = "motion") -> Motion:
     Raises SourceError, with the offset at fault, for one that has anything else than data.
     """
     return _pickled("pickle", name, read_pickle(data))
+
+
+def read_torch(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a file of torch.save; ``name`` becomes its name.
+
+    Raises SourceError, with the offset at fault, for one that has anything else than data.
+    """
+    return _pickled("torch", name, read_tensors(data))
 
 
 def _pickled(format_name: str, name: str, pickle: Pickle) -> Motion:
@@ -140,7 +148,7 @@ def write_arrays(motion: Motion) -> bytes:
 
     Raises MotionError for a motion of another source: ``mcz.to_npz`` writes that one.
     """
-    if motion.source is None or motion.source.format not in ("npy", "npz", "pickle"):
+    if motion.source is None or motion.source.format not in ("npy", "npz", "pickle", "torch"):
         raise MotionError(
             f"motion {motion.name!r} was not made of arrays; to_npz writes it as some"
         )

@@ -27,6 +27,7 @@ from mcz.sources.arrays.header import Head
 from mcz.sources.arrays.layout import (
     BIG_ENDIAN,
     BY_COLUMNS,
+    INTEGERS,
     OF_PIECES,
     SIZES,
     TYPES,
@@ -134,9 +135,9 @@ def _size(piece: Piece, stored: _Stored) -> int:
     match piece.kind:
         case Kind.TEXT | Kind.OWN | Kind.DEFLATE:
             return len(piece.text)
-        case Kind.COUNT | Kind.ROWS:
+        case Kind.COUNT | Kind.ROWS | Kind.ITEMS:
             stored.signal(piece)
-            if piece.kind == Kind.ROWS and piece.size not in ROW_SIZES:  # ARRAY-30
+            if piece.kind in INTEGERS and piece.size not in ROW_SIZES:  # ARRAY-30
                 raise FormatError(f"source template: rows in {piece.size} bytes")
             return piece.size
         case Kind.DATA:
@@ -158,10 +159,10 @@ def _bytes(piece: Piece, stored: _Stored, starts: Sequence[int]) -> Any:
         if number >= 256**size:  # ARRAY-12, ARRAY-32
             raise FormatError(f"source template: a size of {number} in {size} bytes")
         return number.to_bytes(8, "little")[:size]
-    if piece.kind == Kind.ROWS:
-        number = len(stored.rows(piece))
+    if piece.kind in INTEGERS:
+        number = len(stored.rows(piece)) * (piece.start if piece.kind == Kind.ITEMS else 1)
         if number >= 2 ** (8 * piece.size - (piece.size == 4)):  # ARRAY-31
-            raise FormatError(f"source template: {number} rows in {piece.size} bytes")
+            raise FormatError(f"source template: {number} in {piece.size} bytes")
         return number.to_bytes(8, "little")[: piece.size]
     if piece.kind == Kind.COUNT:  # ARRAY-13
         text = b"%d" % len(stored.rows(piece)) + piece.after
@@ -316,7 +317,7 @@ def _cut_pieces(
 
 
 def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
-    """The count in the head of an array, and its numbers."""
+    """The counts in the head of an array, and its numbers."""
     head = array.head
     low, high = head.rows_at
     count = Piece(Kind.ROWS, signal=array.signal, size=high - low, part=array.part)
@@ -337,7 +338,11 @@ def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
         runs=tuple(_runs(channels)),
         part=array.part,
     )
-    return [(low, high, count), (head.start, head.start + head.size, numbers)]
+    low_items, high_items = head.items_at
+    factor = len(channels)
+    items = replace(count, kind=Kind.ITEMS, size=high_items - low_items, start=factor)
+    spans = [(low, high, count), (head.start, head.start + head.size, numbers)]
+    return [*spans, (low_items, high_items, items)] if high_items else spans
 
 
 def _runs(channels: Sequence[int]) -> list[tuple[int, int]]:

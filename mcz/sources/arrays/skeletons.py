@@ -145,7 +145,7 @@ def with_kinds(motion: Motion, name: str) -> Motion:
     """
     kinds = kinds_of(name)
     source, skeleton = motion.source, motion.skeleton
-    if source is None or source.format not in ("npy", "npz", "pickle", "csv"):
+    if source is None or source.format not in ("npy", "npz", "pickle", "torch", "csv"):
         return motion
     if any(channel.kind for channel in skeleton.channels):
         return motion

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import struct
+import zipfile
 from collections.abc import Mapping
 from typing import Any
 
@@ -98,6 +100,28 @@ def joblib_file(value: Mapping[str, Any], *, alignment: int | None = ALIGNMENT) 
     out = bytearray(b"\x80\4")
     _put(out, value, alignment)
     return bytes(out + b".")
+
+
+def tensor_file(array: NDArray[Any]) -> bytes:
+    """A dictionary with a tensor of binary32, as torch saves it."""
+    buffer = io.BytesIO()
+    rebuild, end = b"ctorch._utils\n_rebuild_tensor_v2\n", b"\x89ccollections\nOrderedDict\n)RtR"
+    storage = b"ctorch\nFloatStorage\n" + _word("0") + _word("cpu") + integer(array.size)
+    strides = tuple_of(*(integer(n // array.itemsize) for n in array.strides))
+    tensor = rebuild + b"((" + _word("storage") + storage + b"tQK\0" + shape(array) + strides + end
+    items = {"dof_pos": tensor, "fps": integer(30)}
+    made = b"\x80\2}(" + b"".join(_word(key) + item for key, item in items.items()) + b"u."
+    with zipfile.ZipFile(buffer, "w") as archive:
+        members = {"data.pkl": made, "byteorder": b"little", "data/0": array.tobytes()}
+        members["version"] = b"3\n"
+        for name, data in members.items():
+            archive.writestr(zipfile.ZipInfo(f"take/{name}", (1980, 1, 1, 0, 0, 0)), data)
+    return buffer.getvalue()
+
+
+def _word(text: str) -> bytes:
+    """BINUNICODE."""
+    return b"X" + struct.pack("<I", len(text)) + text.encode()
 
 
 def _put(out: bytearray, value: Any, alignment: int | None) -> None:
