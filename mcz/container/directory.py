@@ -12,7 +12,7 @@ from mcz.container.index_records import PreviousIndex
 from mcz.container.limits import PROFILES, Profile
 from mcz.container.segments import SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
-from mcz.model.schema import MAX_COUNT, parse
+from mcz.model.schema import MAX_COUNT, parse, parse_shared
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,11 +279,16 @@ def parse_head(payload: bytes) -> Profile:
     return PROFILES[head.profile]
 
 
-def parse_clip(payload: bytes, head: bytes, where: str) -> payloads.Clip:
-    """The fields of CLIP, which must not need more than ``head``, the payload of HEAD, states."""
+def parse_clip(payload: bytes, head: bytes, where: str, *, shared: bool = False) -> payloads.Clip:
+    """The fields of CLIP, which must not need more than ``head``, the payload of HEAD, states.
+
+    With ``shared`` clips with equal signals share these.
+    """
     needed, stated = tuple(payload[:2]), tuple(head[2:4])
     if stated and needed > stated:  # CLIP-22
         raise FormatError(f"it needs format {needed}, HEAD states {stated}", where=where)
+    if shared:
+        return parse_shared(payloads.Clip, payload, where, "signals")
     return parse(payloads.Clip, payload, where)
 
 

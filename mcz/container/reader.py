@@ -63,6 +63,7 @@ _row_text = attrgetter(
     "name", "skeleton", "n_frames", "rate_numerator", "rate_denominator", "signals"
 )  # fields of a clip in both CLIP and the index
 KEPT_SKELETONS = 8  # parsed skeletons of a file
+FEW_CLIPS = 16  # of a file, whose CLIPs are parsed one by one
 TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
 
 
@@ -244,9 +245,10 @@ class Container:
             raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
         return fields.data
 
-    def clip(self, row: ClipRow) -> payloads.Clip:
-        """The fields of CLIP, compared with the index."""
-        fields = parse_clip(self.payload(row.clip), self.directory.head, row.clip.label)
+    def clip(self, row: ClipRow, *, shared: bool = False) -> payloads.Clip:
+        """The fields of CLIP, compared with the index; ``shared`` ones may not be changed."""
+        head, shared = self.directory.head, shared and len(self.directory.clips) > FEW_CLIPS
+        fields = parse_clip(self.payload(row.clip), head, row.clip.label, shared=shared)
         row_of_fields = ClipRow.of(fields, row.clip)
         if fields.flags & payloads.OPEN_CLIP:
             if fields.n_frames:  # CLIP-16

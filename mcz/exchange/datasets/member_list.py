@@ -21,7 +21,7 @@ from mcz.exchange.datasets.fields import SignalShape, Units, names_of
 from mcz.exchange.datasets.sources import MOST_OPEN, Member, Recipe, recipe_of
 from mcz.exchange.datasets.windows import Dataset
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.fields import Where
+from mcz.files.reading.fields import Where, filter_clips
 from mcz.files.reading.file import File, is_source, open
 from mcz.kinematics.poses.resampling import (
     MOST_VALUES,
@@ -88,7 +88,8 @@ def dataset(
             if name not in given:
                 stack.enter_context(file)
                 opened[name] = file
-            for clip in file.clips.values() if where is None else file.find(where):
+            clips = file.clips.values()
+            for clip in clips if where is None else filter_clips(clips, where, clips):
                 for member in _members(clip, name, recipe, assumed, across_gaps):
                     if member.n_frames < (window or 1):
                         skipped.append(member)
@@ -154,7 +155,14 @@ def _members(
     clip: Clip, target: str, recipe: Recipe, assumed: Fraction | None, across_gaps: bool
 ) -> Iterator[Member]:
     """The parts of a clip between gaps, at the rate of the data set."""
-    own, timeline = clip.frame_rate or assumed, clip.timeline_at(assumed)
+    own = clip.frame_rate or assumed
+    if own and clip.n_frames and clip.counts_evenly:  # nearly always, and quick
+        even = Member(target, clip.name, clip.n_frames, own, clip.n_frames, time=0.0)
+        if recipe.rate is not None:
+            even = replace(even, n_frames=_resampled_frames(even, None, recipe.rate))
+        yield even
+        return
+    timeline = clip.timeline_at(assumed)
     runs = [(0, clip.n_frames)] if timeline is None or across_gaps else timeline.runs
     for start, stop in runs or [(0, 0)]:
         n_frames = stop - start

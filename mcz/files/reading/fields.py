@@ -6,7 +6,7 @@ of the clip.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -39,8 +39,8 @@ SHORT = {
 METADATA = "metadata."  # before a key that is also the name of a field
 
 
-def filter_clips(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> list[Clip]:
-    """Filter ``clips`` by the query ``where``; ``of`` are all clips of their file.
+def filter_clips(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> Iterator[Clip]:
+    """Filter ``clips``, one by one, by the query ``where``; ``of`` are all clips of their file.
 
     Raises OptionError for a malformed query, and for a name that is unknown in all clips.
     """
@@ -52,7 +52,7 @@ def filter_clips(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> l
         where = _matcher(where, of)
     elif not callable(where):
         raise OptionError(f"where is {where!r}, neither a text nor a function of a clip")
-    return [clip for clip in clips if where(clip)]
+    return filter(where, clips)
 
 
 def _matcher(query: Query, clips: Collection[Clip]) -> Callable[[Clip], bool]:

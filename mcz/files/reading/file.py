@@ -252,7 +252,7 @@ class File:
         docs/reference/queries.md. Raises OptionError for a malformed query, and for a name in it
         that is neither a field nor a metadata key of any clip.
         """
-        return filter_clips(self, where, self.clips.values())
+        return list(filter_clips(self, where, self.clips.values()))
 
     def chosen(self, names: Iterable[str] | None = None, where: Where | None = None) -> list[Clip]:
         """The clips of these names that match ``where``; None: all.
@@ -262,7 +262,7 @@ class File:
         clips = list(self) if names is None else self.clips_called(names)
         if where is None:
             return clips
-        matches = filter_clips(clips, where, self.clips.values())
+        matches = list(filter_clips(clips, where, self.clips.values()))
         if not matches:
             query = shown(where) if isinstance(where, str) else "what is asked for"
             raise OptionError(

@@ -58,7 +58,7 @@ class StoredClip:
 
     @cached_property
     def _fields(self) -> payloads.Clip:
-        return self.container.clip(self._row)
+        return self.container.clip(self._row, shared=True)
 
     @cached_property
     def _cend(self) -> payloads.Cend | None:
@@ -100,6 +100,13 @@ class StoredClip:
     def metadata(self) -> Mapping[str, str]:
         """Keys of the registry, or ``x-...``, and texts, as changed by META chunks."""
         return self.container.metadata(self._row)
+
+    @property
+    def counts_evenly(self) -> bool:
+        """True if its frames are 1, 2, 3, ... without times of their own, as CLIP states."""
+        flags = payloads.OPEN_CLIP | payloads.HAS_TIME_BASE
+        timed = any(signal.role == payloads.TIMES for signal in self._fields.signals)
+        return not (timed or self._fields.flags & flags)
 
     @cached_property
     def _time_base(self) -> payloads.TimeBase | None:

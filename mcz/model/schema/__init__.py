@@ -13,6 +13,7 @@ from mcz.model.schema.records import build as build
 from mcz.model.schema.records import field as field
 from mcz.model.schema.records import parse as parse
 from mcz.model.schema.records import parse_all as parse_all
+from mcz.model.schema.records import parse_shared as parse_shared
 from mcz.model.schema.records import parse_until as parse_until
 from mcz.model.schema.types import EXTENDED as EXTENDED
 from mcz.model.schema.types import EXTENSION as EXTENSION

@@ -35,6 +35,7 @@ from mcz.errors import FormatError, MczError, TruncatedError
 from mcz.model.schema.types import CheckedInRecord, Exactly, Kind, as_construct, field_path
 
 COMPILED_FROM = 4096  # bytes from which compiling a schema, some milliseconds, is worthwhile
+MOST_KNOWN, MOST_BYTES = 256, 65536  # ends of records that ``parse_shared`` keeps, bytes of each
 # Errors of values that do not fit their field: of another type, too large, missing.
 NO_VALUE = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, struct.error)
 
@@ -147,6 +148,33 @@ def parse_until(record: type[R], data: bytes, where: str, before: str) -> R:
         return cast(R, schema.parse_stream(BytesIO(data)))
 
     return _read(read, record, where, before=before, compiled=True)
+
+
+_shared: dict[tuple[type[Record], bytes], dict[str, object]] = {}
+
+
+def parse_shared(record: type[R], data: bytes, where: str, before: str) -> R:
+    """``parse``, for many records that are alike from the field ``before`` on.
+
+    These fields, which must not depend on those before them, are parsed once for equal bytes.
+    Records share them: nobody may change them.
+    """
+    stream = BytesIO(data)
+    try:
+        head = record.compiled_type(before).parse_stream(stream, left={})
+    except (MczError, construct.ConstructError, *NO_VALUE):
+        return parse(record, data, where)
+    rest = record, data[stream.tell() :]
+    tail = _shared.get(rest)
+    if tail is None:
+        whole = parse(record, data, where)
+        tail = {name: value for name, value in vars(whole).items() if name not in vars(head)}
+        if len(_shared) >= MOST_KNOWN:
+            _shared.clear()
+        if len(rest[1]) <= MOST_BYTES:
+            _shared[rest] = tail
+    vars(head).update(tail)
+    return cast(R, head)
 
 
 def parse_all(record: type[R], data: bytes, where: str) -> list[R]:
