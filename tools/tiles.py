@@ -1,13 +1,14 @@
 """Archives' worth of recordings made of a few: tiles of BVH and C3D files, of differing lengths.
 
-    python tools/tiles.py FOLDER TARGET --clips 20000 [--frames 150] [--seed 1]
+    python tools/tiles.py FOLDER TARGET --clips 20000 [--frames 150] [--seed 1] [--robot]
 
 Each tile is a file of a recording below FOLDER: some of its frames in a row, from a random one on,
 the first again behind the last, so that a tile may be longer than its recording. Lengths are
 between a third and five thirds of --frames. No two tiles are the same. TARGET gets a folder for
 every 100 of them, and TARGET/index.csv, which says of each a subject, a session and a description.
 Below TARGET/part lie links to the first eighth, quarter and half of them, for measuring how times
-grow.
+grow. With ``--robot`` the tiles are pairs as BONES-SEED has them: BVH of --frames each, and a CSV
+file of as many rows for a Unitree G1, whose angles are the first ones of the BVH.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ import re
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+from mcz.sources.robots import robot_layouts
 
 LEAST = 100  # frames of a recording that is taken
 A_FOLDER = 100  # tiles
@@ -69,6 +72,18 @@ def c3d(data: bytes) -> tuple[int, Tile] | None:
 
 
 READERS = {".bvh": bvh, ".c3d": c3d}
+ROOT = [f"root_{what}{axis}" for what in ("translate", "rotate") for axis in "XYZ"]
+
+
+def robot_csv(tile: bytes) -> bytes:
+    """The rows of a BVH tile as a G1 has them: frame, root in centimeters and degrees, angles."""
+    names = ["Frame", *ROOT, *(f"{j}_dof" for j in robot_layouts()["unitree-g1-29"].joints)]
+    rows = tile.partition(b"Frame Time:")[2].split(b"\n")[1:-1]
+    lines = [",".join(names)]
+    for number, row in enumerate(rows):
+        values = (f"{float(word):.6f}" for word in row.split()[: len(names) - 1])
+        lines.append(",".join([str(number), *values]))
+    return "\n".join([*lines, ""]).encode()
 
 
 def recordings(folder: Path) -> Iterator[tuple[Path, int, Tile]]:
@@ -80,28 +95,30 @@ def recordings(folder: Path) -> Iterator[tuple[Path, int, Tile]]:
             yield path, *data
 
 
-def write(folder: Path, target: Path, clips: int, frames: int, seed: int) -> int:
+def write(folder: Path, target: Path, clips: int, frames: int, seed: int, robot: bool) -> int:
     """Write the tiles, and say how many bytes they have."""
     chance = random.Random(seed)
-    found = list(recordings(folder))
+    found = [each for each in recordings(folder) if not robot or each[0].suffix == ".bvh"]
     if not found:
         raise SystemExit(f"{folder}: no BVH or C3D file of {LEAST} frames that can be tiled")
     rows, size, seen = [], 0, set()
     while len(rows) < clips:
         path, n_frames, tile = chance.choice(found)
-        n = chance.randint(frames // 3, 5 * frames // 3)
+        n = frames if robot else chance.randint(frames // 3, 5 * frames // 3)
         first = chance.randrange(n_frames)
         if (path, first, n) in seen:
             continue
         seen.add((path, first, n))
         subject = len(rows) // A_FOLDER
-        name = f"{subject:03d}/{subject:03d}_{len(rows) % A_FOLDER:02d}{path.suffix.lower()}"
         data = tile(first, n)
-        (target / name).parent.mkdir(parents=True, exist_ok=True)
-        (target / name).write_bytes(data)
-        size += len(data)
+        pair = {path.suffix.lower(): data} | ({".csv": robot_csv(data)} if robot else {})
         text = f"{n} frames of {path.stem} from {first} on"
-        rows.append((name, f"{subject:03d}", f"{len(rows) % 7}", text))
+        for suffix, content in pair.items():
+            name = f"{subject:03d}/{subject:03d}_{len(rows) % A_FOLDER:02d}{suffix}"
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            (target / name).write_bytes(content)
+            size += len(content)
+            rows.append((name, f"{subject:03d}", f"{len(rows) % 7}", text))
     with (target / "index.csv").open("w", newline="") as stream:
         csv.writer(stream).writerows([("path", "subject", "session", "description"), *rows])
     return size
@@ -129,11 +146,12 @@ def main() -> None:
     parser.add_argument("--clips", type=int, default=20000)
     parser.add_argument("--frames", type=int, default=150, help="of a tile, in the mean")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--robot", action="store_true", help="pairs of BVH and G1 CSV")
     given = parser.parse_args()
     if given.target.exists():
         raise SystemExit(f"{given.target} exists")
     whole = given.target / "all"
-    size = write(given.folder, whole, given.clips, given.frames, given.seed)
+    size = write(given.folder, whole, given.clips, given.frames, given.seed, given.robot)
     link_parts(whole)
     (whole / "part").rename(given.target / "part")
     print(f"{given.clips:,} tiles of {size:,} bytes in {whole}")
