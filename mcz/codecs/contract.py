@@ -95,8 +95,6 @@ class Layout:
     segment_bytes: int = 2**53  # limit of a decoded segment, 8 per value
     find_model: FindModel | None = None  # models in the file, for a decoder
     n_channels: int = field(init=False, repr=False, compare=False)
-    derived: dict[str, object] = field(default_factory=dict, init=False, repr=False, compare=False)
-    # cached by codecs, by the name of the codec
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "n_channels", sum(map(len, self.groups)))
@@ -291,6 +289,7 @@ class Codec:
     re-encodes some groups in all segments (None: unsupported). ``preview`` returns the frames that
     the coarsest resolution decodes exactly (None: none). ``earlier`` has the ``decode`` of each
     earlier version. ``hash_optional``: readers may skip the comparison of the value hash.
+    ``by_rows``: the first rows of a segment take less time than all.
     """
 
     id: int
@@ -317,6 +316,7 @@ class Codec:
     live_options: Params = field(default_factory=dict)
     earlier: Mapping[int, Decode] = field(default_factory=dict)
     hash_optional: bool = False
+    by_rows: bool = False
     preset: int = 0
 
     def has(self, name: str) -> bool:

@@ -173,9 +173,9 @@ def parse_stream_table(data: bytes, counts: StreamCounts) -> StreamTable:
         raise FormatError(f"stream bitmap has bits beyond its {n_streams} streams")
     at += bitmap_size
     lengths = []
-    for index in range(n_streams):
+    for index, is_present in enumerate(reversed(f"{bitmap:0{n_streams}b}"[:n_streams])):
         length = 0
-        if bitmap >> index & 1:
+        if is_present == "1":
             length, at = read_varint(data, at)
             if length == 0:  # DATA-04
                 raise FormatError(f"stream {index} is marked as present and has no bytes")

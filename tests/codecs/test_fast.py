@@ -15,6 +15,7 @@ import mcz
 from mcz.codecs.coding.forms.counts import Law
 from mcz.codecs.coding.forms.products import DEGREE, of_products
 from mcz.codecs.coding.forms.units import of_multiples
+from mcz.container.decoded_cache import DecodedCache
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources import FORMATS
@@ -68,6 +69,30 @@ def test_what_a_column_hides_is_coded(name: str) -> None:
             plainly = 1.11 if codec == "fast" else 1.02  # codes take a bit at least; heads
             assert sum(row.size for row in clip.signals[0].rows) < most * plainly
             assert clip.read()[:, 0].tobytes() == values.tobytes()
+
+
+def test_frames_are_the_same_without_those_behind_them() -> None:
+    """A part of a segment is decoded up to its end where whole segments do not stay in a cache."""
+    columns = {n: grid.values(o) for n, (grid, o, _) in HIDDEN.items() if grid == BINARY32}
+    columns["steps"] = np.repeat([0.0, 2.5, -1e30, 7.0], 125)
+    columns["constant"] = np.full(500, 0.125)
+    columns["copy"] = columns["counts"]
+    spike = columns["counts"].copy()
+    spike[[0, 100, 101, 400]] = 1e30, -0.0, 3e-40, 2.0
+    columns["spike"] = spike
+    channels = tuple(Channel("", name.replace(" ", "_"), "V") for name in columns)
+    values = np.stack(list(columns.values()), axis=1).astype(np.float32).astype(float)
+    motion = Motion(
+        Skeleton((Joint("plate", channels=channels),)),
+        (Signal(values, (BINARY32,) * len(columns)),),
+    )
+    with mcz.open(encode_file("fast", motion, segment_frames=200)) as file:
+        file.container.runs = cache = DecodedCache(0)
+        clip = file.only_clip()
+        for start in [*range(0, 500, 41), *range(0, 500, 7)]:
+            for stop in (start + 1, min(start + 64, 500), 500):
+                assert clip.read((start, stop)).tobytes() == values[start:stop].tobytes()
+        assert cache._share < 0.5
 
 
 def test_integers_beyond_any_float() -> None:

@@ -230,7 +230,7 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     """Fill ``out`` (rows, channels) with the ordinals of a segment; raises FormatError."""
     if not stream or stream[0] > ECHOED:  # BEST-03
         raise FormatError(f"best: method {stream[:1].hex() or 'missing'}")
-    decoder = SegmentDecoder(shape, (0,), lambda _: stream[1:], out)
+    decoder = SegmentDecoder(shape, (0,), lambda _: stream[1:], out, len(out))
     if stream[0] == AS_FAST:
         read_segments([decoder])
         return

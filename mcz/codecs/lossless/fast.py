@@ -35,6 +35,8 @@ from mcz.codecs.contract import (
     refuse_extras,
 )
 from mcz.codecs.segments import Sizing, lossless_segment_frames, segments_by_guess
+from mcz.kernels import lacks_compiled_kernels
+from mcz.model.identity import IdentityCache
 from mcz.model.types import Ints, Params
 
 USUAL_ROWS = 1024
@@ -70,7 +72,10 @@ def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
 def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
 ) -> Ints:
-    """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
+    """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes.
+
+    Rows behind the requested ones are not decoded, except by numpy.
+    """
     refuse_extras("fast", header, layout)
     per_frame = layout.samples_per_frame
     shape = _shape(layout)
@@ -82,11 +87,12 @@ def decode(
         if start < stop:
             n_rows = _rows(layout, span)
             target = out[(start - request.start) * per_frame : (stop - request.start) * per_frame]
-            rows = target if len(target) == n_rows else np.empty((n_rows, n_channels), np.int64)
+            first, last = (start - span.first) * per_frame, (stop - span.first) * per_frame
+            last = n_rows if lacks_compiled_kernels() else last
+            rows = target if len(target) == last else np.empty((last, n_channels), np.int64)
             fetch_group = partial(fetch, index, 0)
-            segments.append(SegmentDecoder(shape, request.groups, fetch_group, rows))
+            segments.append(SegmentDecoder(shape, request.groups, fetch_group, rows, n_rows))
             if rows is not target:
-                first = (start - span.first) * per_frame
                 parts.append((target, rows[first : first + len(target)]))
     read_segments(segments)
     for target, rows in parts:
@@ -100,11 +106,11 @@ def _rows(layout: Layout, span: Span) -> int:
     return n_rows
 
 
+_shapes = IdentityCache(Shape)
+
+
 def _shape(layout: Layout) -> Shape:
-    shape = layout.derived.get(CODEC.name)
-    if not isinstance(shape, Shape):
-        shape = layout.derived[CODEC.name] = Shape(layout.grids, layout.groups)
-    return shape
+    return _shapes(layout.grids, layout.groups)
 
 
 def subset(layout: Layout, span: Span, groups: Sequence[int], fetch: Fetch) -> tuple[bytes, ...]:
@@ -112,8 +118,8 @@ def subset(layout: Layout, span: Span, groups: Sequence[int], fetch: Fetch) -> t
     shape = _shape(layout)
     stream = partial(fetch, 0, 0)
     n_channels = sum(len(layout.groups[group]) for group in groups)
-    ordinals = np.empty((_rows(layout, span), n_channels), np.int64)
-    read_segments([SegmentDecoder(shape, tuple(groups), stream, ordinals)])
+    ordinals = np.empty((n_rows := _rows(layout, span), n_channels), np.int64)
+    read_segments([SegmentDecoder(shape, tuple(groups), stream, ordinals, n_rows)])
     grids = tuple(layout.grids[c] for group in groups for c in layout.groups[group])
     stops = np.cumsum([len(layout.groups[group]) for group in groups]).tolist()
     left = [range(start, stop) for start, stop in zip([0, *stops], stops, strict=False)]
@@ -127,6 +133,7 @@ CODEC = Codec(
     domain="ordinals",
     lossless=True,
     hash_optional=True,
+    by_rows=True,
     encode=encode,
     decode=decode,
     subset=subset,

@@ -6,7 +6,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 from mcz.codecs import CODECS, codec_by_id
@@ -21,11 +21,12 @@ from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
 from mcz.container.skeletons import parse_channels
 from mcz.errors import FormatError
 from mcz.model.clock import TIMES, times_signal_fault
+from mcz.model.identity import IdentityCache
 from mcz.model.motion import ROLES, Channel, Skeleton
 from mcz.model.numbers import Grid, GridKind
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SignalInfo:
     """Facts of one signal from CLIP, and the places of its segments.
 
@@ -58,25 +59,37 @@ class SignalInfo:
     def samples_per_frame(self) -> int:
         return self.layout.samples_per_frame
 
-    @property
+    @cached_property
     def codec(self) -> Codec:
         """The codec; raises UnsupportedError if this reader lacks it."""
         return self.own_codec or codec_by_id(self.codec_id, self.codec_version, self.preset)
 
-    @property
+    @cached_property
     def exact(self) -> tuple[int, ...]:
         """The groups of ordinals of a codec of values."""
         return self.codec.exact(self.header, self.layout) if self.codec.exact else ()
 
-    @property
+    @cached_property
     def is_integer(self) -> bool:
         # GRID-10
         return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)
 
-    @property
+    @cached_property
     def spans(self) -> list[Span]:
         headers = [row.header for row in self.rows]
         return [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h in headers]
+
+    @cached_property
+    def columns(self) -> list[int]:
+        """The channels of all groups, one group after the other."""
+        return [channel for group in self.layout.groups for channel in group]
+
+    @cached_property
+    def coded_grids(self) -> tuple[Grid, ...]:
+        """The grids of ``columns``."""
+        grids = self.layout.grids
+        is_ordered = self.columns == list(range(len(grids)))
+        return grids if is_ordered else tuple(grids[column] for column in self.columns)
 
     def covering(self, start: int, stop: int) -> range:
         """The segments whose own frames overlap the stored frames start <= f < stop."""
@@ -110,14 +123,18 @@ def read_signal(
         coded = None
     n_channels = skeleton.n_channels if channels is None else len(channels)
     check(f"{where}: channels", n_channels, container.profile.channels)
+    try:
+        groups, grids = _partition(own, coded)
+    except FormatError as error:
+        error.add(where=where)
+        raise
     layout = Layout(
         own.skip + row.n_frames + own.spare,
-        # CLIP-09
-        parse_groups(own.groups, skeleton if channels is None else None, n_channels, where),
+        groups,
         own.samples_per_frame,
         coded,
         frame_rate,
-        parse_grids(own.grids, n_channels, where),
+        grids,
         own.n_resolutions,
         find_model=partial(_model, container, row.clip.offset),
     )
@@ -142,6 +159,18 @@ def read_signal(
         _check_times(info, where)
     _check_segments(container, info, index == 0 and bool(fields.source), where)
     return info
+
+
+def _read_partition(
+    own: payloads.Signal, skeleton: Skeleton | None
+) -> tuple[tuple[tuple[int, ...], ...], tuple[Grid, ...]]:
+    """The groups of a signal, and the grids of its channels; its own, or of ``skeleton``."""
+    n_channels = len(own.channels or ()) if skeleton is None else skeleton.n_channels
+    groups = parse_groups(own.groups, skeleton, n_channels)  # CLIP-09
+    return groups, parse_grids(own.grids, n_channels)
+
+
+_partition = IdentityCache(_read_partition)
 
 
 def role_name(role: int) -> str:
@@ -209,21 +238,21 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
 
 
 def parse_groups(
-    fields: Any, skeleton: Skeleton | None, n_channels: int, where: str
+    fields: Any, skeleton: Skeleton | None, n_channels: int
 ) -> tuple[tuple[int, ...], ...]:
     """The channels of each group, as the ``kind`` of GROUPS defines them."""
     if fields.kind == payloads.GROUP_ALL:
         return (tuple(range(n_channels)),) if n_channels else ()
     if fields.kind == payloads.GROUP_JOINT:
         if skeleton is None:
-            raise FormatError("groups per joint, but the channels have no joints", where=where)
+            raise FormatError("groups per joint, but the channels have no joints")
         sizes = [len(joint.channels) for joint in skeleton.joints]
     elif fields.kind == payloads.GROUP_CHANNEL:
         sizes = [1] * n_channels  # CLIP-08
     else:
         sizes = list(fields.sizes)
         if 0 in sizes or sum(sizes) != n_channels:  # CLIP-10, CLIP-11
-            raise FormatError(f"groups of {sizes} channels do not make {n_channels}", where=where)
+            raise FormatError(f"groups of {sizes} channels do not make {n_channels}")
     groups, at = [], 0
     for size in sizes:
         if size:  # CLIP-08
@@ -232,14 +261,14 @@ def parse_groups(
     return tuple(groups)
 
 
-def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
+def parse_grids(runs: Any, n_channels: int) -> tuple[Grid, ...]:
     grids: list[Grid] = []
     for run in runs:
         if not 1 <= run.n_channels <= n_channels - len(grids):  # CLIP-06, CLIP-07
-            raise FormatError(f"grids for more than its {n_channels} channels", where=where)
+            raise FormatError(f"grids for more than its {n_channels} channels")
         grids += [run.grid] * run.n_channels
     if len(grids) != n_channels:  # CLIP-07
-        raise FormatError(f"grids for {len(grids)} of {n_channels} channels", where=where)
+        raise FormatError(f"grids for {len(grids)} of {n_channels} channels")
     return tuple(grids)
 
 

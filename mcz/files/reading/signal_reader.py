@@ -69,8 +69,11 @@ class SignalReader:
         self._lock = Lock()  # of both
         self._threads = container.threads or thread_limit()
         layout = info.layout
-        self._columns = [c for group in self.groups for c in layout.groups[group]]
-        self._grids = tuple(layout.grids[c] for c in self._columns)
+        if groups is None:
+            self._columns, self._grids = info.columns, info.coded_grids
+        else:
+            self._columns = [c for group in groups for c in layout.groups[group]]
+            self._grids = tuple(layout.grids[c] for c in self._columns)
 
     def read(self, start: int, stop: int) -> tuple[Values, NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
@@ -188,11 +191,15 @@ class SignalReader:
         return (start, stop) if stop - start <= most else None
 
     def _cut(self, run: tuple[int, int], start: int, stop: int) -> Iterator[Block]:
-        """Frames of a run, which is decoded if not cached."""
+        """Frames of a run, which is decoded whole if not cached, where that is worthwhile."""
         rows = self.info.covering(run[0], run[0] + 1)
         key = self.info.rows[rows[0]].offset, self.groups, self.resolution
         decoded = self.container.runs.get(key)
         if decoded is None:
+            size = 8 * math.prod(self._shape(*run))
+            if self.info.codec.by_rows and not self.container.runs.is_worthwhile(key, size):
+                yield from self.blocks(start, stop)
+                return
             try:
                 values, mask = self._join(self.blocks, *run)
             except MczError:  # perhaps of a segment that these frames do not need

@@ -48,7 +48,7 @@ class MemorySource:
         parts = codec.partition(motion.skeleton, options) if codec.partition and options else None
         self.is_listed = parts is not None
         kinds = payloads.Groups(kind=group_kind(signal, codec.grouping))
-        usual = parse_groups(kinds, motion.skeleton, signal.n_channels, signal.name)
+        usual = parse_groups(kinds, motion.skeleton, signal.n_channels)
         groups, exact = parts or (usual, ())
         self.is_lossless = codec.lossless
         self.exact = [channel for group in exact for channel in groups[group]]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.kernels import SPARE, lacks_compiled_kernels
+from mcz.model.identity import IdentityCache
 from mcz.model.numbers import textgrids
 from mcz.model.numbers.grid import Grid, grid_blocks
 from mcz.model.numbers.magnitudes import POWERS
@@ -36,7 +37,7 @@ def values_of(
         left = np.ones(len(grids), np.int64)
         if not lacks_compiled_kernels():
             left[:] = 0
-            _kernels("value").fill_values(ordinals, _rules(tuple(grids)), TENS, values, left)
+            _kernels("value").fill_values(ordinals, _known_rules(tuple(grids)), TENS, values, left)
         for grid, columns in _unfilled_channels(left, grids):
             values[:, columns] = grid.values(ordinals[:, columns])
         return values
@@ -110,6 +111,9 @@ def _rules(grids: tuple[Grid, ...]) -> Ints:
             case _:
                 rule[:] = loops.OTHER, 0, 0
     return rules
+
+
+_known_rules = IdentityCache(_rules)
 
 
 def _kernels(what: str) -> ModuleType:

@@ -167,10 +167,12 @@ def read_heads_of(
 class SegmentDecoder:
     """Decodes some groups of a segment: heads, then lanes, then dependent columns."""
 
-    def __init__(self, shape: Shape, groups: tuple[int, ...], fetch: Fetch, out: Ints) -> None:
-        """``out``: (rows, channels of ``groups``). Raises FormatError."""
+    def __init__(
+        self, shape: Shape, groups: tuple[int, ...], fetch: Fetch, out: Ints, n_rows: int
+    ) -> None:
+        """``out``: (rows, channels of ``groups``), of ``n_rows`` the first. Raises FormatError."""
         lane = kernels()[1]
-        heads, n_whole = read_heads_of(shape, groups, fetch, len(out))
+        heads, n_whole = read_heads_of(shape, groups, fetch, n_rows)
         columns = heads.columns
         channel, fault = lane.link(
             heads.plans, columns.firsts, columns.groups, columns.places, len(groups), n_whole
@@ -181,7 +183,7 @@ class SegmentDecoder:
         self.n_channels = int(columns.firsts[n_whole])
         is_exact = self.n_channels == out.shape[1]
         self.rows = out if is_exact else np.empty((len(out), self.n_channels), np.int64)
-        self.lanes = _lanes_of(heads, n_whole, self.rows)
+        self.lanes = _lanes_of(heads, n_whole, self.rows, len(out) == n_rows)
 
     def finish(self) -> None:
         """Fill ``out``, after the lanes were decoded."""
@@ -208,7 +210,7 @@ class SegmentDecoder:
             column[:] = ordinals + column if has_rests else ordinals
 
 
-def _lanes_of(heads: Heads, n_whole: int, out: Ints) -> Lanes:
+def _lanes_of(heads: Heads, n_whole: int, out: Ints, is_whole: bool) -> Lanes:
     own, lane, residual, tail = kernels()
     n_lanes = int(np.sum(heads.plans[:, own.KIND] == own.CODED))
     starts, columns = np.empty(len(heads.groups) + 1, np.int64), np.empty(n_lanes, np.int64)
@@ -218,9 +220,8 @@ def _lanes_of(heads: Heads, n_whole: int, out: Ints) -> Lanes:
     leads = np.empty((residual.BEHIND + len(out), n_lanes), np.int32)
     bits = 8 * heads.parts
     data = np.frombuffer(heads.data, np.uint8)
-    return Lanes(
-        data, bits[:, :2], bits[:n_whole, 1:], starts, columns, predictors, lattices, leads, out
-    )
+    parts = bits[:, :2], bits[:n_whole, 1:]
+    return Lanes(data, *parts, starts, columns, predictors, lattices, leads, out, is_whole)
 
 
 def read_segments(segments: Sequence[SegmentDecoder]) -> None:
@@ -235,5 +236,5 @@ def read_alone(shape: Shape, stream: bytes, n_rows: int) -> Ints:
     n_channels = len(shape.grids)
     check_size(n_rows, n_channels, n_rows)
     out = np.empty((n_rows, n_channels), np.int64)
-    read_segments([SegmentDecoder(shape, (0,), lambda group: stream, out)])
+    read_segments([SegmentDecoder(shape, (0,), lambda group: stream, out, n_rows)])
     return out

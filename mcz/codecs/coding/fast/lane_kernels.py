@@ -113,7 +113,8 @@ def fill_steps(data: Bytes, at: int, rows: Ints2, n: int) -> None:
     for _ in range(n_runs):
         n_rows, at = head.varint(data, at, len(data))
         size = int(data[at])
-        fill_rows(rows, n, row, row + n_rows, short_ordinal(data, at + 1, size))  # FAST-24
+        end = min(row + n_rows, len(rows))
+        fill_rows(rows, n, row, end, short_ordinal(data, at + 1, size))  # FAST-24
         row += n_rows
         at += 1 + size
 
@@ -125,7 +126,8 @@ def put_exceptions(data: Bytes, at: int, rows: Ints2, n: int) -> None:
         gap, at = head.varint(data, at, len(data))
         row += gap + 1
         size = int(data[at])
-        rows[row, n] = short_ordinal(data, at + 1, size)  # FAST-38
+        if row < len(rows):
+            rows[row, n] = short_ordinal(data, at + 1, size)  # FAST-38
         at += 1 + size
 
 
@@ -133,7 +135,7 @@ def put_exceptions(data: Bytes, at: int, rows: Ints2, n: int) -> None:
 def fill_columns(data: Bytes, plans: Ints2, n_wanted: int, rows: Ints2) -> None:
     """Fill ``rows`` (rows, channels) but for what is coded; copies in the first ``n_wanted``.
 
-    What the heads say was checked.
+    ``rows`` may be the first ones of the segment alone. What the heads say was checked.
     """
     n_rows, n_channels = rows.shape
     for n in range(n_channels):

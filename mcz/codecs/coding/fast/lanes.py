@@ -35,7 +35,7 @@ NEVER = 1 << 62  # a least long tail, if there are none
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """The coded channels of a segment, ready to be decoded.
+    """The coded channels of a segment, or of its first rows, ready to be decoded.
 
     ``starts``: the first lane of each group whose residuals are read, and the number of all;
     ``columns``: the channels of lanes. Tails are of groups that are read whole.
@@ -50,6 +50,7 @@ class Lanes:
     lattices: Ints
     leads: NDArray[np.int32]  # (BEHIND + rows, lanes), filled by the decoder
     out: Ints  # (rows, channels), so are the columns of lanes
+    is_whole: bool  # these are all rows of the segment
 
 
 def read_all(segments: Sequence[Lanes]) -> None:
@@ -66,12 +67,12 @@ def _read_compiled(lanes: Lanes) -> None:
     """Fill the columns of the lanes of one segment; raises FormatError."""
     bits, ends = np.ascontiguousarray(lanes.residuals.T)
     fault = residual.read_leads(lanes.data, bits, ends, lanes.starts, lanes.predictors, lanes.leads)
-    if fault != -1:
+    if fault >= 0 or (fault < -1 and lanes.is_whole):
         raise fault_of("residuals", "row", fault)
     bits, ends = np.ascontiguousarray(lanes.tails.T)
     tails = tail.Tails(lanes.data, bits, ends, lanes.starts, lanes.columns)
     fault = tail.read_ordinals(tails, lanes.lattices, lanes.leads[residual.BEHIND :], lanes.out)
-    if fault != -1:
+    if fault >= 0 or (fault < -1 and lanes.is_whole):
         raise fault_of("tails", "lane", fault)
 
 

@@ -1,0 +1,30 @@
+"""``IdentityCache``: results of a function of large unchanging things, found by their identity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+MOST = 256  # results that are kept
+Result = TypeVar("Result")
+
+
+class IdentityCache(Generic[Result]):
+    """``function`` of things that nobody changes; the last results are kept, with the things.
+
+    A hash of a tuple of many grids, say, takes longer than much that is derived from it.
+    """
+
+    def __init__(self, function: Callable[..., Result]) -> None:
+        self._function = function
+        self._known: dict[tuple[int, ...], tuple[tuple[object, ...], Result]] = {}
+
+    def __call__(self, *things: object) -> Result:
+        key = tuple(map(id, things))
+        entry = self._known.get(key)
+        if entry is None:
+            entry = things, self._function(*things)
+            if len(self._known) >= MOST:
+                self._known.clear()  # as other threads may do: nothing is iterated over
+            self._known[key] = entry
+        return entry[1]
