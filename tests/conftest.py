@@ -18,7 +18,7 @@ from tests.commands import Call, Result, run
 settings.register_profile("dev", max_examples=30, deadline=None)
 settings.register_profile(
     "ci",
-    max_examples=50,
+    max_examples=25,
     deadline=None,
     derandomize=True,  # a build must not fail by luck
     print_blob=True,

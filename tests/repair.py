@@ -16,6 +16,7 @@ from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
 from mcz.container.segments import mask_of, parse_segment_header
 from mcz.container.source import open_source
+from tests.amounts import amount
 from tools.fuzz import repair
 from tools.fuzz.repair import Piece, pieces_of, table_of, with_payload
 
@@ -122,7 +123,7 @@ def flips(size: int, at_most: int, seed: int) -> Iterator[tuple[int, int]]:
     """(byte, bit) of every bit, or of ``at_most`` of them drawn by ``seed``."""
     import random
 
-    every = range(size * 8)
+    every, at_most = range(size * 8), amount(at_most, max(20, min(at_most // 3, 400)))
     chosen = every if len(every) <= at_most else sorted(random.Random(seed).sample(every, at_most))
     return ((n // 8, n % 8) for n in chosen)
 

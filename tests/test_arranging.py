@@ -21,6 +21,7 @@ from mcz.container.writer import Writer
 from mcz.files.editing.reorganize import natural
 from mcz.sources.sample import write_samples
 from tests import live_codec
+from tests.amounts import amount
 from tests.motions import skeleton
 
 
@@ -291,7 +292,7 @@ def test_a_full_disk_leaves_the_old_file(
     assert sorted(p.name for p in a.parent.iterdir()) == ["a.mcz", "b.mcz"]
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=amount(60, 25), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_no_damage_is_carried_over(files: tuple[Path, Path], data: st.DataObject) -> None:
     """A byte that is wrong is refused, or lies in what is made anew; the target is never wrong."""

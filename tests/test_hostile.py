@@ -6,12 +6,11 @@ the limits have earned.
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
 import mcz
 from conformance.run import VECTORS
+from tests.amounts import amount
 from tests.motions import rich, write_bytes
 from tests.repair import (
     flip_bit,
@@ -24,7 +23,7 @@ from tests.repair import (
     with_index_content,
 )
 
-POSITIONS = 2000 if os.environ.get("MCZ_LONG") else 80  # bits a file and kind of damage
+POSITIONS = amount(2000, 80)  # bits a file and kind of damage
 MEMORY = 64 * 2**20
 
 

@@ -27,6 +27,7 @@ from mcz.container.recovery.layout import Shape, build_packet, read_packet, shap
 from mcz.container.source import ByteSource
 from mcz.files.editing.protecting import protections
 from mcz.sources.sample import write_samples
+from tests.amounts import amount
 from tests.clocked_files import bvh
 
 SHARED = [HealthCheck.function_scoped_fixture]
@@ -77,7 +78,7 @@ def test_blocks_are_those_of_the_formula(n: int, m: int, seed: int) -> None:
         np.testing.assert_array_equal(found[i], row)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=amount(60, 20), deadline=None)
 @given(st.integers(1, 60), st.integers(1, 20), st.data())
 def test_any_lost_blocks_come_back(n: int, m: int, data: st.DataObject) -> None:
     random = np.random.default_rng(data.draw(st.integers(0, 2**32)))
@@ -137,7 +138,7 @@ def test_a_file_that_is_as_it_was_comes_back(archive: bytes, tmp_path: Path) -> 
     assert (report.restored, report.damage, data) == (True, [], archive)
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=SHARED)
+@settings(max_examples=amount(80, 20), deadline=None, suppress_health_check=SHARED)
 @given(st.data())
 def test_bad_bytes_wherever_they_lie(
     archive: bytes, shapes: list[Shape], tmp_path: Path, data: st.DataObject
@@ -154,7 +155,7 @@ def test_bad_bytes_wherever_they_lie(
     assert found == archive
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=SHARED)
+@settings(max_examples=amount(80, 20), deadline=None, suppress_health_check=SHARED)
 @given(st.data())
 def test_a_burst_wherever_it_lies(
     archive: bytes, shapes: list[Shape], tmp_path: Path, data: st.DataObject
@@ -238,7 +239,7 @@ def test_verify_finds_recovery_data_that_are_none(archive: bytes, shapes: list[S
     assert mcz.verify(bytes(bad), quick=True) == []
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=SHARED)
+@settings(max_examples=amount(60, 20), deadline=None, suppress_health_check=SHARED)
 @given(st.data())
 def test_any_damage_is_repaired_or_salvaged_or_refused(
     archive: bytes, tmp_path: Path, data: st.DataObject
@@ -419,7 +420,7 @@ def test_one_byte_more_is_left_out(small: tuple[bytes, bytes], tmp_path: Path) -
     assert any("1 bytes behind its end" in line for line in report.damage)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=SHARED)
+@settings(max_examples=amount(60, 20), deadline=None, suppress_health_check=SHARED)
 @given(st.data())
 def test_protection_makes_no_tail_worse(
     small: tuple[bytes, bytes], archive: bytes, tmp_path: Path, data: st.DataObject

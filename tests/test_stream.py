@@ -45,6 +45,7 @@ from mcz.files.reading.report import info
 from mcz.files.reading.sizes import layout
 from mcz.model.schema import build, parse
 from tests import live_codec
+from tests.amounts import amount
 from tests.clocked_files import bvh
 from tests.repair import flip_bit, parts_of, use
 from tools.records import build_record
@@ -510,7 +511,7 @@ EDITS = st.lists(
 )
 
 
-@settings(max_examples=60)
+@settings(max_examples=amount(60, 25))
 @given(EDITS, st.sampled_from(["missing", "hold", "linear"]), st.booleans())
 def test_any_damage(edits: list[tuple[float, str, int]], lost: str, join: bool) -> None:
     data = b"".join(pieces(n=33))

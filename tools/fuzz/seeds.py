@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path, PurePosixPath
 
 import mcz
@@ -26,14 +26,19 @@ def vectors(*folders: str) -> dict[str, bytes]:
 def sources(name: str) -> dict[str, bytes]:
     """The source files with the suffix ``name`` that valid vectors restore, each once."""
     found: dict[bytes, str] = {}
+    for vector, source, data in _restore_sources():
+        if PurePosixPath(source).suffix.lower() == f".{name}":
+            found.setdefault(data, vector)
+    return {f"{vector}-{n}.{name}": data for n, (data, vector) in enumerate(found.items())}
+
+
+@cache
+def _restore_sources() -> list[tuple[str, str, bytes]]:
+    """The small source files of all valid vectors: the vector, the path, the bytes."""
+    restored: list[tuple[str, str, bytes]] = []
     for path in sorted((VECTORS / "valid").rglob("*.mcz")):
-        for source, data in _restore_sources(path):
-            if PurePosixPath(source).suffix.lower() == f".{name}" and len(data) <= LARGEST:
-                found.setdefault(data, f"{path.parent.name}-{path.stem}")
-    return {f"{where}-{n}.{name}": data for n, (data, where) in enumerate(found.items())}
-
-
-def _restore_sources(path: Path) -> Iterator[tuple[str, bytes]]:
-    with mcz.open(path.read_bytes()) as file:
-        for source, restore in named_files(file):
-            yield source, restore()
+        with mcz.open(path.read_bytes()) as file:
+            for source, restore in named_files(file):
+                if len(data := restore()) <= LARGEST:
+                    restored.append((f"{path.parent.name}-{path.stem}", source, data))
+    return restored
