@@ -18,7 +18,8 @@ static bool read_bytes(const uint8_t *data, size_t size) { /* whether they open 
     for (size_t i = 0; file && mcz_get_clip(file, i, &k) == MCZ_OK; i++) {
         for (size_t j = 0; mcz_get_joint(file, k.skeleton, j, &joint) == MCZ_OK && j < 64; j++) {}
         for (size_t j = 0; mcz_get_signal(file, i, j, &s) == MCZ_OK; j++) {
-            if (k.n_frames > MOST_VALUES || k.n_frames * s.rows_per_frame > MOST_VALUES / MAX_OF(1, s.n_channels)) continue;
+            uint64_t most_rows = MOST_VALUES / MAX_OF(1, s.n_channels);
+            if (k.n_frames > MOST_VALUES || k.n_frames * s.rows_per_frame > most_rows) continue;
             uint64_t begin = size % 3 ? 0 : k.n_frames / 3;
             mcz_rows *rows = mcz_rows_open(file, i, j, begin, k.n_frames, &error);
             while (rows && mcz_rows_next(rows, &block, &error) == 1) {}
@@ -62,7 +63,8 @@ static size_t edit(uint8_t *p, size_t n) {
     switch (n ? random_below(7) : 0) {
     case 0: /* insert */
         memmove(p + at + size, p + at, n - (n ? at : 0));
-        for (size_t i = 0; i < size; i++) p[at + i] = random_below(2) ? odd[random_below(10)] : (uint8_t)random_below(256);
+        for (size_t i = 0; i < size; i++)
+            p[at + i] = random_below(2) ? odd[random_below(10)] : (uint8_t)random_below(256);
         return n + size;
     case 1: /* delete */
         size = MIN_OF(size, n - at);

@@ -67,7 +67,8 @@ typedef struct {
     mcz_error error;
 } answer;
 
-static void list_array(answer *a, const mcz_clip *k, const mcz_signal *s, const char *array, const char *type, size_t size) {
+static void list_array(answer *a, const mcz_clip *k, const mcz_signal *s, const char *array, const char *type,
+                       size_t size) {
     uint64_t begin = 0, end = k->n_frames;
     size_t n = a->columns ? a->n_columns : s->n_channels;
     if (a->q->has_frames) begin = a->q->begin, end = a->q->end < end ? a->q->end : end;
@@ -131,7 +132,8 @@ static int find_columns(answer *a, size_t skeleton) {
     for (const char *p = a->q->joints; p && *p; p += strcspn(p, ","), p += *p == ',') {
         size_t joint = strtoull(p, NULL, 10), first = 0;
         mcz_joint x;
-        for (size_t i = 0; i < joint; i++) first += mcz_get_joint(a->file, skeleton, i, &x) == MCZ_OK ? x.n_channels : 0;
+        for (size_t i = 0; i < joint; i++)
+            if (mcz_get_joint(a->file, skeleton, i, &x) == MCZ_OK) first += x.n_channels;
         if (mcz_get_joint(a->file, skeleton, joint, &x) != MCZ_OK) return MCZ_INVALID;
         size_t *more = realloc(a->columns, (a->n_columns + x.n_channels + 1) * sizeof *more);
         if (!more) return MCZ_NO_MEMORY;
@@ -241,8 +243,9 @@ static char *json_string(char *p, char **end) {
         }
         if (code < 0x80) *out++ = (char)code;
         else if (code < 0x800) *out++ = (char)(0xC0 | code >> 6);
-        else if (code < 0x10000) *out++ = (char)(0xE0 | code >> 12), *out++ = (char)(0x80 | (code >> 6 & 63));
-        else *out++ = (char)(0xF0 | code >> 18), *out++ = (char)(0x80 | (code >> 12 & 63)), *out++ = (char)(0x80 | (code >> 6 & 63));
+        else if (code < 0x10000) *out++ = (char)(0xE0 | code >> 12);
+        else *out++ = (char)(0xF0 | code >> 18), *out++ = (char)(0x80 | (code >> 12 & 63));
+        if (code >= 0x800) *out++ = (char)(0x80 | (code >> 6 & 63));
         if (code >= 0x80) *out++ = (char)(0x80 | (code & 63));
     }
     *end = *p ? p + 1 : p;

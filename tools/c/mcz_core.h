@@ -1,7 +1,7 @@
 /* mcz_core: a decoder of MCZ files of the class "core" (SPEC.md, Classes of conformance).
    Everything is read from memory that the caller keeps until mcz_close. No global state: readers of different
    threads do not meet. The numerals in this library are read and printed without a decimal point, so a locale
-   that the program has set does no harm. CC0-1.0 or the licence of the project, as you like. */
+   that the program has set does no harm. */
 #ifndef MCZ_CORE_H
 #define MCZ_CORE_H
 #include <stddef.h>
