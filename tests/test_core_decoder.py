@@ -23,8 +23,7 @@ def test_core_decoder_passes_vectors_of_its_class(tmp_path: Path) -> None:
     subprocess.run([str(COMPILER), *CFLAGS, *sources, "-o", str(program)], check=True)
     decoder = f"{program} --words {ROOT / 'conformance/annex/words.bin'}"
     command = [sys.executable, "-m", "conformance.run", "--serve", "--decoder", decoder]
-    asked = subprocess.run(
-        [*command, "--class", "core", "--every", "24"], cwd=ROOT, capture_output=True, text=True
-    )
+    command += ["--class", "core", "--every", "24"]
+    asked = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert asked.returncode == 0, asked.stdout + asked.stderr
     assert ", 0 failed" in asked.stdout

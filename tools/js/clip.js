@@ -6,7 +6,7 @@ import { INTEGER, parseGrid } from "./grids.js";
 import { readNeeds } from "./head.js";
 import { within } from "./limits.js";
 import { checkPlainSignal } from "./plain.js";
-import { MOTION, RESIDUALS, TIMES, TIMES_PER_SECOND, checkSourceFormat } from "./registry.js";
+import { MOTION, RESIDUALS, TIMES, TIMES_PER_SECOND, checkSourceFormat, isScalar } from "./registry.js";
 import { checkPath } from "./shared.js";
 import { readChannel } from "./skel.js";
 import { readTimeBase } from "./time-base.js";
@@ -153,7 +153,7 @@ function checkRoles(reader, signals, timeBase) {
   }
   for (const { channels, ownChannels, samplesPerFrame } of times) {
     const isPlain = ownChannels && samplesPerFrame === 1 && channels.length === 1;
-    if (!isPlain || channels[0].kind !== 0 || !TIMES_PER_SECOND.has(channels[0].unit)) {
+    if (!isPlain || !isScalar(channels[0]) || !TIMES_PER_SECOND.has(channels[0].unit)) {
       reader.refuse("times that are not one plain scalar a frame in units of time");
     }
   }

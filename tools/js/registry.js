@@ -10,6 +10,9 @@ export const ANALOG = 4;
 export const OUTPUTS = 5;
 export const ROTATIONS = 6;
 
+/** Whether a channel is a plain scalar: of kind 0 or of one beyond the registry. */
+export const isScalar = ({ kind }) => kind === 0 || kind > 17; // SKEL-07
+
 /** The units of times, and how many of them are a second. */
 export const TIMES_PER_SECOND = new Map([["s", 1], ["ms", 1e3], ["us", 1e6], ["ns", 1e9]]);
 
