@@ -70,12 +70,13 @@ def facing(
 def _quantities() -> dict[str, tuple[str, float]]:
     """Units of physical quantities -> (quantity, size)."""
     units = {unit: ("length", size / 100) for unit, size in UNIT_CM.items()}
-    units |= {"deg": ("angle", math.pi / 180), "°": ("angle", math.pi / 180), "rad": ("angle", 1.0)}
+    units |= {"deg": ("angle", math.pi / 180), "°": ("angle", math.pi / 180)}
     units |= {"Nmm": ("moment", 1e-3), "Ncm": ("moment", 1e-2), "nt": ("N", 1.0)}
     units |= {"ntmm": ("moment", 1e-3), "g": ("acceleration", 9.80665), "m/s2": ("acceleration", 1)}
     prefixes = {"": 1.0, "k": 1e3, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}
-    for base in ("V", "N", "Nm", "W", "Pa", "Hz", "s"):
-        units |= {p + base: ("moment" if base == "Nm" else base, f) for p, f in prefixes.items()}
+    quantities = {"Nm": "moment", "rad": "angle"}
+    for base in ("V", "N", "Nm", "W", "Pa", "Hz", "s", "rad"):
+        units |= {p + base: (quantities.get(base, base), f) for p, f in prefixes.items()}
     return units
 
 
@@ -85,7 +86,7 @@ _QUANTITIES = _quantities()
 def unit_ratio(unit: str, other: str) -> float | None:
     """The size of ``unit`` in ``other``; None if they measure different quantities.
 
-    >>> unit_ratio("mV", "V"), unit_ratio("N.m", "Nmm"), unit_ratio("mV", "N")
+    >>> unit_ratio("mrad", "rad"), unit_ratio("N.m", "Nmm"), unit_ratio("mV", "N")
     (0.001, 1000.0, None)
     """
     plain_unit, other_unit = (re.sub(r"[\s.*·]", "", text) for text in (unit, other))

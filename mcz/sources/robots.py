@@ -79,7 +79,7 @@ def recognize_robot(motion: Motion) -> Motion:
     named = with_robot_layout(motion, names[0]) if len(names) == 1 else None
     note = f"{NOTE}are those of {names[0]}: {n_joints} joints and a unit quaternion"
     if named is None:
-        note = f"{NOTE}may be those of {' or '.join(names)}, if arrays names it"
+        note = f"{NOTE}may be those of {' or '.join(names)} (the option arrays states it)"
     notes = filter(None, (motion.metadata.get("source-note", ""), note))
     motion = named or motion
     return replace(motion, metadata=dict(motion.metadata) | {"source-note": SEPARATOR.join(notes)})

@@ -103,7 +103,7 @@ def test_names_of_a_known_robot() -> None:
     assert motion.skeleton.joint_names == joints
     assert motion.metadata["x-robot"] == "unitree-g1-29"
     note = read(pickle.dumps(robot(n_joints=29))).metadata["source-note"]
-    assert note == "the columns may be those of unitree-g1-29, if arrays names it"
+    assert note == "the columns may be those of unitree-g1-29 (the option arrays states it)"
     clip["link_body_list"] = ["pelvis", *bodies[::-1]]  # the order of another robot
     assert "x-robot" not in read(pickle.dumps(clip)).metadata
 

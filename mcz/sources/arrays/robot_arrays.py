@@ -69,7 +69,7 @@ def joint_names(arrays: Sequence[Array], n_joints: int) -> tuple[tuple[str, ...]
         if len(common) >= ALIKE * n_joints and common == [s for s in stems if s in common]:
             return layout.joints, name, ""
     robots = " or ".join(layouts)
-    return (), "", f"{NOTE}may be those of {robots}, if arrays names it" if robots else ""
+    return (), "", f"{NOTE}may be those of {robots} (the option arrays states it)" if robots else ""
 
 
 def robot_channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...] | None:
