@@ -41,6 +41,8 @@ from mcz.cli.terminal import Progress
 if TYPE_CHECKING:
     from mcz.files.writing.file import Written
 
+INPUT_FORMATS = "bvh amc c3d asf trc mot sto csv mvnx npy npz pickle torch".split()
+
 
 @click.command(short_help="Encode a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npz or .pkl.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
@@ -58,23 +60,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(
-        (
-            "bvh",
-            "amc",
-            "c3d",
-            "asf",
-            "trc",
-            "mot",
-            "sto",
-            "csv",
-            "mvnx",
-            "npy",
-            "npz",
-            "pickle",
-            "torch",
-        )
-    ),
+    type=click.Choice(INPUT_FORMATS),
     help="Set the format of standard input. Default: detect it from the content; for live input "
     "BVH, or AMC with --skeleton.",
 )
