@@ -53,6 +53,7 @@ COMMANDS = {  # name: module and function
     "bench": "bench.bench_command",
     "train": "codecs.train_command",
     "codecs": "codecs.codecs_command",
+    "selftest": "selftest.selftest_command",
     "completion": "main.completion_command",
 }
 

@@ -57,6 +57,14 @@ def page(say: Say | None = None) -> Page:
 
 ROOT = Path(__file__).parents[3]
 VIEWER = "tools/viewer"
+
+
+def has_page() -> bool:
+    """Return True if the page is there without being built."""
+    paths = Path(os.environ.get(OTHER, PACKAGED)), ROOT / VIEWER / "dist" / "viewer.html"
+    return any(path.is_file() for path in paths)
+
+
 COMMAND = f"(cd {VIEWER} && npm ci && npm run build)"
 INSTALL = ("ci", "--no-audit", "--no-fund")
 SHOWN = 300  # last characters of the output of a failed program
