@@ -168,6 +168,9 @@ def test_frames_and_errors_of_a_library(codec: str) -> None:
     np.testing.assert_array_equal(part["walk"]["root_rot"], whole["walk"]["root_rot"][50:])
     np.testing.assert_array_equal(part["run"]["dof_pos"], whole["run"]["dof_pos"][:4])
     assert early["walk"]["dof_pos"].shape == (6, 5) and early["run"]["dof_pos"].shape == (0, 5)
+    again = read(pickle.dumps(early))
+    assert again.n_frames == 6 and [*mcz.split_clips(again)] == ["walk", "run"]
+    assert FORMATS["pickle"].write(again) == pickle.dumps(early)
 
 
 def test_clips_that_differ() -> None:

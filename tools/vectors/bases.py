@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from mcz.container.segments import SegmentHeader
 from mcz.model.motion import Channel, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.schema import varint
-from mcz.sources import FORMATS
+from mcz.sources import format_of
 from tools.vectors import source_bases
 from tools.vectors.build import by_hand as written
 from tools.vectors.build import extensions, motions
@@ -134,8 +134,8 @@ def zeros(n_frames: int, name: str = "wave", *beside: str, rate: int | None = No
 def read(file: str, path: str = "") -> Base:
     """The clip of a file below ``sources``, which it restores as ``path``."""
     data = (SOURCES / file).read_bytes()
-    stem, _, suffix = (path or file).rpartition("/")[2].rpartition(".")
-    motion = set_path(FORMATS[suffix].read(data, stem), path or file)
+    stem = PurePosixPath(path or file).stem
+    motion = set_path(format_of(path or file).read(data, stem), path or file)
     return Base((motion,), None, ((path or file, data),))
 
 

@@ -119,7 +119,7 @@ def read_signal(
     if own.flags & payloads.OWN_CHANNELS:
         channels = parse_channels(own.channels, where)
     coded: Skeleton | None = skeleton
-    if channels is not None:  # PWAVE-04
+    if channels is not None:  # CLIP-09, PWAVE-04
         coded = None
     n_channels = skeleton.n_channels if channels is None else len(channels)
     check(f"{where}: channels", n_channels, container.profile.channels)
@@ -166,8 +166,7 @@ def _read_partition(
 ) -> tuple[tuple[tuple[int, ...], ...], tuple[Grid, ...]]:
     """The groups of a signal, and the grids of its channels; its own, or of ``skeleton``."""
     n_channels = len(own.channels or ()) if skeleton is None else skeleton.n_channels
-    groups = parse_groups(own.groups, skeleton, n_channels)  # CLIP-09
-    return groups, parse_grids(own.grids, n_channels)
+    return parse_groups(own.groups, skeleton, n_channels), parse_grids(own.grids, n_channels)
 
 
 _partition = IdentityCache(_read_partition)

@@ -22,6 +22,7 @@ from mcz.sources.arrays.meaning import frames_of
 from mcz.sources.arrays.restore import Placed
 
 CLIP, CLIPS = "x-clip", "x-clips"  # the key of a clip in its file; those of all, with their frames
+NOTHING = np.empty((0, 0))  # the numbers of an array without rows
 NO_CLIPS = "{n} clips in one file, such as {one!r} and {two!r}, have no array in common"
 
 
@@ -59,17 +60,23 @@ class Library:
 def join_clips(arrays: Sequence[Array], clips: Mapping[str, Mapping[str, int]]) -> Library:
     """Join the arrays of clips; ``clips`` have the index of each array by its name.
 
-    Arrays that some clips lack, or have in another shape, are in none. Raises SourceError where no
-    others are left.
+    Arrays that some clips lack, or have in another shape, are in none. A clip may be empty, as
+    those beside a range of frames are. Raises SourceError where no arrays of frames are left.
     """
-    own = {
+    arrays = [replace(a, kept="", words=NOTHING) if _is_empty(a) else a for a in arrays]
+    named = {
         name: {key: replace(arrays[k], name=key) for key, k in members.items()}
         for name, members in clips.items()
-        if any(not arrays[k].kept and len(arrays[k].head.shape) > 1 for k in members.values())
+    }
+    keys = {k for each in named.values() for k, a in each.items() if _has_frames(a) and a.n_rows}
+    own = {
+        name: each
+        for name, each in named.items()
+        if any(key in keys and _has_frames(array) for key, array in each.items())
     }
     rows = {key: [each.get(key) for each in own.values()] for key in next(iter(own.values()), {})}
     alike = {key: found for key, found in rows.items() if _are_alike(found)}
-    if all(found[0].kept for found in alike.values()):
+    if all(each.kept or not each.n_rows for found in alike.values() for each in found):
         one, two = [*clips][:2]
         raise SourceError(NO_CLIPS.format(n=len(clips), one=one[:80], two=two[:80]))
     counts = [frames_of([each[key] for key in alike]) for each in own.values()]
@@ -102,19 +109,29 @@ def _fact(array: Array) -> object:
     return head.code, head.shape[1:]
 
 
+def _has_frames(array: Array) -> bool:
+    return not array.kept and len(array.head.shape) > 1
+
+
+def _is_empty(array: Array) -> bool:
+    """Return True for an array of frames that has none."""
+    head = array.head
+    return head.is_number and len(head.shape) > 1 and head.shape[0] == 0
+
+
 def _have_even_rows(arrays: Sequence[Array], counts: Sequence[int]) -> bool:
     """Return True for as many rows a frame in every clip."""
-    rows = arrays[0].n_rows
-    pairs = zip(arrays, counts, strict=True)
-    return all(array.n_rows * counts[0] == rows * count for array, count in pairs)
+    pairs = [(array.n_rows, count) for array, count in zip(arrays, counts, strict=True)]
+    rows, most = max(pairs, key=lambda pair: pair[1])
+    return all(n_rows * most == rows * count for n_rows, count in pairs)
 
 
 def _joined(arrays: Sequence[Array]) -> Array:
     """The array of all clips."""
-    one = arrays[0]
+    one = max(arrays, key=lambda array: 0 if array.kept else array.n_rows)
     if one.kept:
         return one
-    words = np.concatenate([array.numbers for array in arrays])
+    words = np.concatenate([array.numbers for array in arrays if array.n_rows])
     head = replace(one.head, shape=(len(words), *one.head.shape[1:]))
     return replace(one, head=head, words=words)
 
