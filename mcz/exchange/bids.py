@@ -26,7 +26,6 @@ BIDS_VERSION = "1.10.0"
 NOT_APPLICABLE, MISSING = "n/a", "NaN"
 COLUMNS = ("name", "component", "type", "tracked_point", "units")
 UNKNOWN = "unknown"  # the label of a subject that no metadata name
-TRACKING = {"imu": ("mvnx",)}  # tracking systems by source format, "omc", optical, of any other
 TYPES = {"tx": "POS", "ty": "POS", "tz": "POS", "rx": "JNTANG", "ry": "JNTANG", "rz": "JNTANG"}
 QUATERNION = {f"q{part}": f"quat_{part}" for part in "xyzw"}
 BY_UNIT = {"rad": "JNTANG", "deg": "JNTANG", "m/s": "VEL", "m/s^2": "ACCEL", "s": "LATENCY"}
@@ -75,8 +74,8 @@ def recording_of(motion: Motion) -> Recording:
         return Recording(subject, session, task, named[0].removesuffix("_motion"))
     subject = _label(motion.metadata.get("subject", "")) or UNKNOWN
     task = _label(motion.name) or UNKNOWN
-    source = motion.source.format if motion.source is not None else ""
-    system = next((name for name, formats in TRACKING.items() if source in formats), "omc")
+    is_inertial = motion.source is not None and motion.source.format == "mvnx"
+    system = "imu" if is_inertial else "omc"  # optical
     return Recording(subject, "", task, f"sub-{subject}_task-{task}_tracksys-{system}")
 
 
