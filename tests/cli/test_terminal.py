@@ -111,6 +111,7 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
         "bench": [[odd]],
         "train": [[odd, "-o", str(out)]],
         "codecs": [[STEERING], []],
+        "selftest": [[]],
         "completion": [["bash"], [STEERING]],
     }
     return calls[name]
