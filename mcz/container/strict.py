@@ -23,7 +23,7 @@ from mcz.model.schema import Record, parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
 # The source formats of the registry, by the kind of their content.
-OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset({*range(2, 15), 16})
+OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset({*range(2, 15), 16, 17})
 
 
 def is_plain_path(name: str) -> bool:

@@ -76,7 +76,9 @@ def test_api_says_what_is_there(server: Server) -> None:
     assert (api["canEncode"], api["canConvert"], api["salvage"]) == (True, True, False)
     assert api["diff"] is False  # there are three
     texts = ".amc .asf .bvh .csv .mot .mvnx .sto .trc .tsv"
-    assert api["suffixes"] == sorted(f"{texts} .c3d .joblib .npy .npz .pickle .pkl".split())
+    assert api["suffixes"] == sorted(
+        f"{texts} .c3d .joblib .npy .npz .pickle .pkl .pt .pth".split()
+    )
     assert api["version"] == mcz.__version__
     codecs = {codec["name"]: codec for codec in api["codecs"]}
     assert next(iter(codecs)) == "posewave"  # what "lossy" stands for

@@ -292,7 +292,7 @@ static bool is_type(const mcz *m, const shared *s, const char *type) {
 }
 
 enum { ASF = 1 };
-static bool of_clips(unsigned format) { return within(format, 2, 14) || format == 16; }
+static bool of_clips(unsigned format) { return within(format, 2, 14) || format == 16 || format == 17; }
 
 static void check_path(cursor *c, mcz_text t, bool may_be_empty) {
     size_t begin = 0;
