@@ -52,7 +52,7 @@ class Started:
 
     def __init__(self, *arguments: object) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "mcz.cli.main", *map(str, arguments)],
+            [sys.executable, "-m", "mcz", *map(str, arguments)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

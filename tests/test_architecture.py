@@ -43,6 +43,7 @@ ALLOWED = ROOMS | {
     "version": set(),
     "kernels": set(),
     "dask": {"files"},
+    "__main__": {"cli"},
     PUBLIC: FILES | {"exchange", "show", "version"},
 }
 # Parts of a room from below: none imports a part of a later line.

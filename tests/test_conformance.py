@@ -226,7 +226,7 @@ def test_one_process_answers_as_many_do() -> None:
 
 
 def test_runner_passes_our_encoder() -> None:
-    encoder = f"{sys.executable} -m mcz.cli.main encode - -o -"
+    encoder = f"{sys.executable} -m mcz encode - -o -"
     only = ("--only", "valid/sources/amc.mcz", "--only", "valid/sources/c3d-intel-integers")
     code, shown = runner("--decoder", OURS, "--encoder", encoder, "--serve", *only, "--json")
     assert code == 0, shown

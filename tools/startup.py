@@ -17,7 +17,7 @@ import mcz
 from mcz.codecs import CODECS
 
 OF_POSITIONS = "lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo", "online"  # no BVH or AMC holds them
-MAIN = sys.executable, "-m", "mcz.cli.main"
+MAIN = sys.executable, "-m", "mcz"
 
 
 def main() -> None:

@@ -22,6 +22,7 @@ from mcz.cli.common import (
 from mcz.cli.lazy import lazy_group
 from mcz.cli.options import force_option, json_option, version_option
 
+SHELLS = ("bash", "zsh", "fish")
 COMMANDS = {  # name: module and function
     "sample": "main.sample_command",
     "encode": "encode.encode_command",
@@ -76,13 +77,6 @@ def main() -> None:
     sys.exit(run(cli, "mcz"))
 
 
-if __name__ == "__main__":
-    main()
-
-
-SHELLS = ("bash", "zsh", "fish")
-
-
 @click.command(short_help="Print completion for bash, zsh or fish.")
 @click.argument("shell", metavar="|".join(SHELLS), type=click.Choice(SHELLS))
 def completion_command(shell: str) -> Exit:
@@ -94,8 +88,6 @@ def completion_command(shell: str) -> Exit:
     fish:  mcz completion fish | source      in ~/.config/fish/config.fish
     """
     from click.shell_completion import get_completion_class
-
-    from mcz.cli.main import cli
 
     completes = get_completion_class(shell)
     if completes is None:

@@ -270,7 +270,7 @@ def test_help_lists_commands_and_exit_codes(call: Call) -> None:
 
 def test_pipes(walk: Path) -> None:
     """A file on standard input, its source on standard output."""
-    command = [sys.executable, "-m", "mcz.cli.main", "decode", "-", "-o", "-"]
+    command = [sys.executable, "-m", "mcz", "decode", "-", "-o", "-"]
     done = subprocess.run(command, input=walk.read_bytes(), capture_output=True, check=True)
     assert done.stdout == walk.with_suffix(".bvh").read_bytes()
     assert done.stderr == b""

@@ -154,7 +154,7 @@ def test_standard_streams_are_files_too(folder: Path, words: str) -> None:
     else:
         words += " < walk.bvh"
     done = subprocess.run(
-        f"{sys.executable} -m mcz.cli.main {words}",
+        f"{sys.executable} -m mcz {words}",
         shell=True,
         cwd=folder,
         env=ENV,

@@ -29,7 +29,7 @@ BVH = (
     "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 3\n"
     "Frame Time: 0.01\n1.25\n1.5\n2.50\n"
 )
-PYTHON = (sys.executable, "-m", "mcz.cli.main")
+PYTHON = (sys.executable, "-m", "mcz")
 
 
 @pytest.fixture

@@ -53,7 +53,7 @@ def asf(tmp_path: Path) -> Path:
 
 def run(*arguments: str | Path, data: bytes = b"", cwd: Path = ROOT) -> tuple[int, bytes, str]:
     done = subprocess.run(
-        [sys.executable, "-m", "mcz.cli.main", *map(str, arguments)],
+        [sys.executable, "-m", "mcz", *map(str, arguments)],
         check=False,
         input=data,
         capture_output=True,

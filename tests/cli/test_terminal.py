@@ -161,7 +161,7 @@ def on_a_terminal(*arguments: object) -> bytes:
 
     pid, handle = pty.fork()
     if pid == 0:
-        os.execv(sys.executable, [sys.executable, "-m", "mcz.cli.main", *map(str, arguments)])
+        os.execv(sys.executable, [sys.executable, "-m", "mcz", *map(str, arguments)])
     while True:
         try:
             if not read(handle):

@@ -181,16 +181,25 @@ def test_export_of_joints_gaps_and_names(tmp_path: Path) -> None:
 
 
 def test_what_bids_does_not_have(tmp_path: Path) -> None:
-    """A clip without a rate, and two clips of one name, fail; the others are written."""
-    joints = (mcz.Joint("a", channels=(mcz.Channel("", "value"),)),)
-    for name, rate in (("x-1", 50), ("x_1", 50), ("y", None)):
-        motion = mcz.Motion(mcz.Skeleton(joints), (mcz.Signal(np.ones((3, 1))),), rate, name=name)
-        mcz.write(motion, tmp_path / f"{name}.mcz")
-    mcz.merge([tmp_path / f"{name}.mcz" for name in ("x-1", "x_1", "y")], tmp_path / "all.mcz")
+    """Clips without rate or channels, and two of one name, fail; the others are written."""
+    value = mcz.Joint("a", channels=(mcz.Channel("", "value"),))
+    paths = []
+    for name, rate, joints in (
+        ("x-1", 50, (value,)),
+        ("x_1", 50, (value,)),
+        ("y", None, (value,)),
+        ("z", 50, ()),
+    ):
+        signal = mcz.Signal(np.ones((3, len(joints))))
+        motion = mcz.Motion(mcz.Skeleton(joints), (signal,), rate, name=name)
+        paths.append(tmp_path / f"{name}.mcz")
+        mcz.write(motion, paths[-1])
+    mcz.merge(paths, tmp_path / "all.mcz")
     report = mcz.export(tmp_path / "all.mcz", tmp_path / "out", "bids")
     reasons = [outcome.message for outcome in report.failures]
-    assert ["another clip becomes" in reason for reason in reasons] == [True, False]
+    assert ["another clip becomes" in reason for reason in reasons] == [True, False, False]
     assert "BIDS requires a frame rate" in reasons[1]
+    assert "no motion of joints or points" in reasons[2]
     assert (tmp_path / "out" / "README").exists()
 
 

@@ -37,7 +37,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @contextmanager
 def start_view(*words: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """``mcz view`` in a process of its own, and the address that it says."""
-    command = [sys.executable, "-m", "mcz.cli.main", "view", *map(str, words), "--no-browser"]
+    command = [sys.executable, "-m", "mcz", "view", *map(str, words), "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
     try:

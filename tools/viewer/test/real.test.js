@@ -34,7 +34,7 @@ after(async () => {
 });
 
 function mcz(...args) {
-  const done = spawnSync(python, ["-m", "mcz.cli.main", ...args], { env: environment, encoding: "utf8" });
+  const done = spawnSync(python, ["-m", "mcz", ...args], { env: environment, encoding: "utf8" });
   assert.ok(done.status <= 1, done.stderr);
 }
 

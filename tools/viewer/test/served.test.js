@@ -17,7 +17,7 @@ after(() => browser?.close());
 
 /** What a command of `mcz` says. */
 const mcz = (...args) =>
-  spawnSync(python, ["-m", "mcz.cli.main", ...args], { env: environment, encoding: "utf8" });
+  spawnSync(python, ["-m", "mcz", ...args], { env: environment, encoding: "utf8" });
 
 /** Waits for so many tries of the quality panel. */
 const tried = (page, n) =>
@@ -28,7 +28,7 @@ const tried = (page, n) =>
 
 /** Runs `mcz view` on files as long as `run(url)` takes. */
 async function viewed(args, run) {
-  const words = ["-m", "mcz.cli.main", "view", "--no-browser", "--keep", ...args];
+  const words = ["-m", "mcz", "view", "--no-browser", "--keep", ...args];
   const server = spawn(python, words, { env: environment });
   let said = "";
   server.stderr.on("data", (data) => (said += data));
