@@ -1,8 +1,9 @@
 // Reads the annex from the disk, for programs that run in Node.
 
-import { readFileSync } from "node:fs";
+import { existsSync, readFileSync } from "node:fs";
 
-const folder = new URL("../../conformance/annex/", import.meta.url);
+const packed = new URL("annex/", import.meta.url); // of the package; else that of the repository
+const folder = existsSync(packed) ? packed : new URL("../../conformance/annex/", import.meta.url);
 
 /**
  * @param {string} name an annex file

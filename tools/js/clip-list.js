@@ -32,7 +32,7 @@ class ClipList {
     }
   }
 
-  /** @returns {ListedClip | undefined} */
+  /** @returns {import("./clip-list.js").ListedClip | undefined} */
   at(index) {
     const row = this.rows.at(index < 0 ? this.length + index : index);
     if (row === undefined) return undefined;
@@ -50,7 +50,7 @@ class ClipList {
     };
   }
 
-  /** @returns {ListedClip[]} plain objects, which may be sent from a worker to its page */
+  /** @returns {import("./clip-list.js").ListedClip[]} plain objects, which may be sent from a worker to its page */
   slice(start = 0, end = this.length) {
     const out = [];
     for (let i = start; i < Math.min(end, this.length); i++) out.push(this.at(i));

@@ -36,6 +36,7 @@ const GROUPS_LISTED = 3;
  * @property {Map<string, string>} metadata
  * @property {object | null} source template, format, detail, path, size
  * @property {Signal[]} signals the motion, if any, is the first
+ * @property {import("./cend.js").ClipEnd} [end] where CEND was read
  */
 
 /**

@@ -1,3 +1,4 @@
+#!/usr/bin/env node
 // Restores the files that an archive was made of: node unpack.js [--force] FILE.mcz FOLDER
 //
 // Each is written under its path below FOLDER, its SHA-256 checked, and has its name when all of it

@@ -1,0 +1,73 @@
+"""Files of a release: one version, placeholders in one list, the archive of the specification."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import mcz
+
+ROOT = Path(__file__).parents[1]
+REGISTRATIONS = ROOT / "conformance" / "registrations" / "README.md"
+
+
+def test_every_file_states_the_version() -> None:
+    versions = {
+        name: re.search(pattern, (ROOT / name).read_text("utf-8"))
+        for name, pattern in {
+            "pyproject.toml": r'(?m)^version = "(.*)"',
+            "CITATION.cff": r"(?m)^version: (.*)",
+            "tools/js/package.json": r'"version": "(.*)"',
+            "tools/viewer/package.json": r'"version": "(.*)"',
+        }.items()
+    }
+    assert {name: found and found[1] for name, found in versions.items()} == dict.fromkeys(
+        versions, mcz.__version__
+    )
+    assert json.loads((ROOT / ".zenodo.json").read_text("utf-8"))["title"]
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no repository")
+@pytest.mark.parametrize("placeholder", ["https://mcz.invalid", "contact@mcz.invalid"])
+def test_placeholders_are_listed(placeholder: str) -> None:
+    found = subprocess.run(
+        ["git", "grep", "-lF", placeholder], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    row = next(
+        line
+        for line in REGISTRATIONS.read_text("utf-8").splitlines()
+        if line.startswith(f"| `{placeholder}`")
+    )
+    own = {"tests/test_release.py", REGISTRATIONS.relative_to(ROOT).as_posix()}
+    listed = set(re.findall(r"`([^`]+)`", row)) - {placeholder}
+    assert listed == set(found.stdout.split()) - own
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no repository")
+def test_archive_of_the_specification(tmp_path: Path) -> None:
+    """It is the same each time, whole, and has hashes of its members."""
+    script = ROOT / "tools" / "spec_archive.py"
+    archives = []
+    for folder in (tmp_path / "1", tmp_path / "2"):
+        subprocess.run([sys.executable, script, folder], check=True, capture_output=True)
+        (path,) = folder.iterdir()
+        archives.append(path.read_bytes())
+    assert archives[0] == archives[1]
+    with zipfile.ZipFile(path) as archive:
+        top = path.stem + "/"
+        contents = {name.removeprefix(top): archive.read(name) for name in archive.namelist()}
+    sums = dict(
+        reversed(line.split("  ", 1)) for line in contents.pop("SHA256SUMS").decode().splitlines()
+    )
+    assert sums == {name: hashlib.sha256(data).hexdigest() for name, data in contents.items()}
+    assert contents["SPEC.md"] == (ROOT / "SPEC.md").read_bytes()
+    for part in ("annex", "vectors"):
+        files = [p for p in (ROOT / "conformance" / part).rglob("*") if p.is_file()]
+        assert {p.relative_to(ROOT).as_posix() for p in files} <= contents.keys()
