@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mcz.codecs.posewave.choices import choose, choose_orders
-from mcz.codecs.posewave.header import parse_posewave_header
-from mcz.codecs.posewave.orders import SEQUENCES, Orders
+from mcz.codecs.posewave.header import joint_codes, order_settings, parse_posewave_header
+from mcz.codecs.posewave.orders import SEQUENCES, VECTOR_CODE, Orders, vector_codes
 from mcz.codecs.posewave.posewave import CODEC
 from mcz.codecs.posewave.segment import decode_segment, encode_segment
 from mcz.errors import MotionError
@@ -24,7 +24,7 @@ from mcz.model.motion import ROTATION_KINDS, Channel, Joint, Motion, Signal, Ske
 Floats = np.ndarray
 UNITS = st.sampled_from(["deg", "rad"])
 SEQUENCE = st.sampled_from(SEQUENCES)
-CODES = st.integers(1, 6)
+CODES = st.integers(1, VECTOR_CODE)
 PARAMETERS = {"step": 0.2, "levels": 3, "weights": None}
 
 
@@ -121,3 +121,38 @@ def test_codec() -> None:
     wild[7, 3] = 2.0**40
     with pytest.raises(MotionError, match="an angle of"):
         encode_segment(header, skeleton, wild, choice.weights)
+
+
+def arm(n_joints: int) -> Skeleton:
+    """A chain of joints that turn about z, x and y, each with an end."""
+    hip = single((2, 0, 1), "deg").joints[0]
+    joints = [replace(hip, name=f"joint {j}", parent=j - 1) for j in range(n_joints)]
+    return replace(single((2, 0, 1), "deg"), joints=tuple(joints))
+
+
+def test_vectors_are_chosen() -> None:
+    """Joints, but no root, that swing about a line which turns."""
+    skeleton, t = arm(3), np.linspace(0, 20, 400)
+    swings = 1.2 * np.stack([np.cos(t), np.sin(t), np.sin(1.7 * t)], axis=1)
+    angles = Rotation.from_rotvec(swings).as_euler("ZXY", degrees=True)
+    values = unwrap(np.tile(np.insert(angles, 1, t, axis=1), (1, 3)), skeleton)
+    codes = choose_orders(source_of(skeleton, values))
+    assert {joint: codes.get(joint) for joint in (1, 2)} == vector_codes(skeleton)
+    assert codes.get(0) != VECTOR_CODE
+    source = source_of(skeleton, values)
+    choice = choose(source, PARAMETERS)
+    header = parse_posewave_header(choice.header, source.layout)
+    assert header.orders == codes
+    streams, expected = encode_segment(header, skeleton, values, choice.weights)
+    found = decode_segment(header, skeleton, streams, len(values), "here")
+    assert np.array_equal(found, expected)
+    assert np.abs(positions_of(skeleton, found) - positions_of(skeleton, values)).max() < 0.5
+
+
+@given(st.dictionaries(st.integers(0, 4), CODES))
+def test_codes_of_a_header(codes: dict[int, int]) -> None:
+    """The flag of vectors and the fewest records say what every joint has."""
+    skeleton = arm(5)
+    flag, records = order_settings(codes, skeleton)
+    assert joint_codes(flag, records, skeleton) == codes
+    assert len(records) <= len(codes)

@@ -1,9 +1,8 @@
 // SPEC.md, "Axis orders": joints of posewave that are coded as Euler angles in another order of axes
-// than the source has. All bits count here.
+// than the source has, or as rotation vectors. All bits count here.
 
-import { Refused } from "./errors.js";
 import { AXIS_ORDERS } from "./kinematics.js";
-import { RULES, rotate, turn } from "./pose-metric.js";
+import { RULES, VECTOR, limited, rotate, turn, vectorTurn } from "./pose-metric.js";
 
 const UNKNOWN_UNIT = 0;
 const RX = 4;
@@ -33,10 +32,16 @@ function arc(y, x, { high, low, radians }) {
   return y < 0 ? -angle : angle;
 }
 
-/** Angles by axis of the sequence `given` as those of another: the solution around 0. */
-function changed(angles, given, [i, j, k], rule) {
+/** The rotation by angles of a sequence, or by a rotation vector, where `code` says so. */
+function matrixOf(angles, code, rule) {
+  if (code === VECTOR) return vectorTurn(angles.map(limited), rule.radians).R;
   const M = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-  for (const axis of given) rotate(M, axis, turn(angles[axis], rule));
+  for (const axis of AXIS_ORDERS[code - 1]) rotate(M, axis, turn(angles[axis], rule));
+  return M;
+}
+
+/** Angles by axis of a rotation M in a sequence: the solution around 0. */
+function changed(M, [i, j, k], rule) {
   const e = j === (i + 1) % 3 ? 1 : -1;
   const first = arc(-e * M[3 * j + k], M[4 * k], rule);
   const [sine, c] = turn(first, rule);
@@ -49,7 +54,7 @@ function changed(angles, given, [i, j, k], rule) {
 }
 
 /** Of a joint its columns by axis and its sequence in the source; null where it can have no code. */
-function turnsOf({ channels, firstColumn }, { intrinsic, angleUnit }) {
+export function turnsOf({ channels, firstColumn }, { intrinsic, angleUnit }) {
   const columns = [];
   const sequence = [];
   channels.forEach(({ kind }, i) => {
@@ -68,16 +73,12 @@ export class AxisOrders {
   /**
    * @param {import("./skel.js").Skeleton} skeleton
    * @param {ArrayLike<number>} codes of each joint, or none
-   * @throws {Refused} for a joint that can have no code
    */
   constructor(skeleton, codes) {
     this.rule = RULES[skeleton.angleUnit];
     this.full = FULL_TURNS[skeleton.angleUnit];
     this.joints = Array.from(codes).flatMap((code, j) => {
-      if (code === 0) return [];
-      const turns = turnsOf(skeleton.joints[j], skeleton);
-      if (turns === null) throw new Refused(`posewave: an axis order of joint ${j}`);
-      return [{ coded: AXIS_ORDERS[code - 1], ...turns }];
+      return code === 0 ? [] : [{ code, ...turnsOf(skeleton.joints[j], skeleton) }];
     });
   }
 
@@ -122,7 +123,7 @@ export class AxisOrders {
     });
   }
 
-  follow({ columns, coded, own }, values, nChannels, note) {
+  follow({ columns, code, own }, values, nChannels, note) {
     const { full } = this;
     const half = 0.5 * full;
     const other = (v, axis) => (axis === own[1] ? half - v : v + half);
@@ -133,12 +134,8 @@ export class AxisOrders {
     let isSecond = false;
     for (let f = 0; f * nChannels < values.length; f++) {
       const at = columns.map((column) => f * nChannels + column);
-      const found = changed(
-        at.map((place) => values[place]),
-        coded,
-        own,
-        this.rule,
-      );
+      const coded = at.map((place) => values[place]);
+      const found = changed(matrixOf(coded, code, this.rule), own, this.rule);
       if (before !== null) {
         let [one, two] = [0, 0];
         for (const axis of own) {

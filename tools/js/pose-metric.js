@@ -10,6 +10,10 @@ const SX = 7;
 const QW = 11;
 const VX = 15;
 const MAX_PATH = 96;
+
+/** The code of a joint whose three angles are coded as a rotation vector. */
+export const VECTOR = 7;
+
 const BEYOND = 2 ** 40;
 const [LEAST_REG, GREATEST_REG] = [2 ** -100, 2 ** 100];
 const GREATEST = 2 ** 120;
@@ -34,7 +38,7 @@ const isVector = ({ kind }) => kind >= VX && kind < VX + 3;
 const clamp = (v, least, greatest) => (v < least ? least : v > greatest ? greatest : v);
 
 /** v, or 0 where it is not below 2^40 in magnitude, or not a number. */
-const limited = (v) => (Math.abs(v) < BEYOND ? v : 0);
+export const limited = (v) => (Math.abs(v) < BEYOND ? v : 0);
 
 /** The factors of a Taylor series. */
 const factors = (...ks) => ks.map((k) => 1 / (k * (k + 1)));
@@ -91,7 +95,7 @@ function exponential(s) {
 // Matrices are 9 numbers, row after row.
 
 /** What a change of each part of a rotation vector turns about, and the rotation. */
-function vectorTurn(parts, radians) {
+export function vectorTurn(parts, radians) {
   let [x, y, z] = parts.map((part) => part * radians);
   let s = x * x + y * y + z * z;
   if (!(s < 256)) x = y = z = s = 0;
@@ -250,7 +254,12 @@ export class PoseMetric {
       if (!isRotation(channel)) return [];
       return [{ axis: channel.kind - RX, column: from, number: this.numbers.get(from) }];
     });
-    if (order) return AXIS_ORDERS[order - 1].map((axis) => turns.find((one) => one.axis === axis));
+    if (order) {
+      const byAxis = [0, 1, 2].map((axis) => turns.find((one) => one.axis === axis));
+      if (order !== VECTOR) return AXIS_ORDERS[order - 1].map((axis) => byAxis[axis]);
+      const parts = byAxis.map((one) => one.column);
+      return [{ kind: VX, parts, numbers: byAxis.map((one) => one.number) }];
+    }
     return intrinsic ? turns : turns.reverse();
   }
 

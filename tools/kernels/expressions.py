@@ -60,6 +60,7 @@ FLOAT_CALLS = {
     "math.exp": "exp",
     "math.cos": "cos",
     "math.sin": "sin",
+    "math.sqrt": "sqrt",
 }
 RANKED = (BOOL, INT, FLOAT)
 

@@ -35,6 +35,7 @@ cdef extern from "arithmetic.h" nogil:
     double mcz_power "pow"(double a, double b)
     double floor(double a)
     double rint(double a)
+    double sqrt(double a)
     double log2(double a)
     double log(double a)
     double exp(double a)

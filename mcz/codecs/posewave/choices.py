@@ -24,16 +24,25 @@ from mcz.codecs.posewave.header import (
     REFINING,
     SPREADS,
     START_TABLES,
+    VECTORS,
     WHOLE_TURNS,
-    AxisOrderFields,
     Header,
     PosewaveHeader,
     build_header,
     has_whole_turns,
+    joint_codes,
+    order_settings,
     parse_posewave_header,
 )
 from mcz.codecs.posewave.model import number_of
-from mcz.codecs.posewave.orders import N_NOTES, N_ORDERS, Orders, columns_by_axis, own_sequence
+from mcz.codecs.posewave.orders import (
+    N_NOTES,
+    N_ORDERS,
+    VECTOR_CODE,
+    Orders,
+    columns_by_axis,
+    own_sequence,
+)
 from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
@@ -103,11 +112,11 @@ def choose(source: SignalSource, params: Params) -> Choice:
     fields["exact"] = groups[1] if groups else ()
     exact = {channel for group in fields["exact"] for channel in source.layout.groups[group]}
     like = None if params.get("like") is None else parse(PosewaveHeader, params["like"], NAME)
-    fields["orders"] = (
-        like.orders
-        if like
-        else [AxisOrderFields(joint=j, code=c) for j, c in choose_orders(source, exact).items()]
-    )
+    if like:
+        vectors, fields["orders"] = like.flags & VECTORS, like.orders
+    else:
+        vectors, fields["orders"] = order_settings(choose_orders(source, exact), skeleton)
+    fields["flags"] |= vectors
     if params.get("weights") is not None:
         fields["weights"] = [code_of(float(weight)) for weight in params["weights"]]
     fields["levels"] = like.levels if like else params["levels"]
@@ -298,7 +307,7 @@ def best_levels(
     if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(tried):
         return min(tried)
     values = FrameReader(NAME, source).next(n_frames)
-    orders = Orders({order.joint: order.code for order in fields["orders"]}, skeleton)
+    orders = Orders(joint_codes(fields["flags"], fields["orders"], skeleton), skeleton)
     coded = orders.to_coded_order(values)
     no_notes = np.zeros((-(-n_frames // SAMPLE_DISTANCE), len(orders.places), N_NOTES), np.int64)
 
@@ -348,6 +357,7 @@ def distortion(header: Header, skeleton: Skeleton, values: Floats, decoded: Floa
 SOURCE_ORDER = 0  # code of the order of the source
 RUNS, RUN_FRAMES = 16, 128  # sampled runs of a long clip
 DUE = 0.985  # an order is chosen if its score is below this share of the source's
+VECTOR_SHARE = 0.96  # of their score: vectors suit the metric better than angles
 STILL = 1e-4  # of a turn: a joint whose steps change by less keeps its order
 GREATEST = 2.0**20  # of an angle, whose sine is exact enough in any unit
 
@@ -369,6 +379,7 @@ def choose_orders(source: SignalSource, exact: Container[int] = ()) -> dict[int,
         return {}
     columns = np.array([columns_by_axis(skeleton, index) for index in joints])
     scores, highest, n_rows = np.zeros((1 + N_ORDERS, len(joints))), np.zeros(len(joints)), 0
+    roots = [skeleton.joints[joint].parent < 0 for joint in joints]
     for values in _runs(source):
         n_rows += len(values)
         highest = np.maximum(highest, np.abs(values[:, columns]).max(axis=(0, 2), initial=0.0))
@@ -377,6 +388,7 @@ def choose_orders(source: SignalSource, exact: Container[int] = ()) -> dict[int,
             codes = dict.fromkeys(joints, code) if code != SOURCE_ORDER else {}
             coded = Orders(codes, skeleton).to_coded_order(values)[:, columns]
             scores[code] += np.sqrt(np.abs(np.diff(coded, 2, axis=0))).sum(axis=(0, 2))
+    scores[VECTOR_CODE] = np.where(roots, math.inf, VECTOR_SHARE * scores[VECTOR_CODE])
     full = Orders({}, skeleton).full
     moves = (scores[SOURCE_ORDER] > np.sqrt(STILL * full) * n_rows) & (highest < GREATEST)
     worth = moves & (scores.min(axis=0) < DUE * scores[SOURCE_ORDER])

@@ -14,7 +14,13 @@ import numpy as np
 from mcz.codecs.coding.fast.decoder import MOST_ROWS, MOST_VALUES, Shape, read_alone
 from mcz.codecs.coding.fast.encoder import StreamBuilder
 from mcz.codecs.contract import Layout, Request, SignalSource, Span
-from mcz.codecs.posewave.header import NAME, START_TABLES, PosewaveHeader, build_header
+from mcz.codecs.posewave.header import (
+    NAME,
+    START_TABLES,
+    VECTORS,
+    PosewaveHeader,
+    build_header,
+)
 from mcz.codecs.segments import gather
 from mcz.errors import FormatError, OptionError
 from mcz.kinematics.joint_groups import find_joints
@@ -84,7 +90,8 @@ def cut_header(
         )
     left = {"plain": [], "orders": [], "exact": list(range(len(groups)))}
     start = fields.start % START_TABLES  # without a prior
-    return build_header(**vars(fields) | left | {"start": start})
+    flags = fields.flags & ~VECTORS
+    return build_header(**vars(fields) | left | {"start": start, "flags": flags})
 
 
 def most_frames(layout: Layout, groups: Sequence[int]) -> int:

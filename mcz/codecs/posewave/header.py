@@ -17,7 +17,7 @@ from mcz.codecs.contract import Layout
 from mcz.codecs.parameters import code_of, ratio_of
 from mcz.codecs.posewave.contact_plan import Contacts, ContactsFields, parse_contacts
 from mcz.codecs.posewave.model import Prior, Start, priors, start_tables
-from mcz.codecs.posewave.orders import N_ORDERS, check_orders
+from mcz.codecs.posewave.orders import N_ORDERS, check_orders, vector_codes
 from mcz.errors import FormatError
 from mcz.model.motion import (
     ANGLE_KINDS,
@@ -46,14 +46,16 @@ MAX_LEVELS = 8
 MAX_FINE = 24
 WHOLE_SHARE, SPREADS = 16, 32  # of ``shell``
 START_TABLES = 16  # of ``start``: reserved number
-REFINING, WHOLE_TURNS = 1, 2  # of ``flags``
+REFINING, WHOLE_TURNS, VECTORS = 1, 2, 4  # of ``flags``
 
 
 class AxisOrderFields(Record):
     """The axis order of a joint, in the header of posewave."""
 
     joint: int = field(UVARINT, "joint that has it")
-    code: int = field(bounded(Int8ul, 1, N_ORDERS), "its axis order, 1 to 6")  # PWAVE-23
+    code: int = field(
+        bounded(Int8ul, 0, N_ORDERS), "its axis order, 1 to 6; 7: a rotation vector; 0: none"
+    )  # PWAVE-23
 
 
 class PosewaveHeader(Record):
@@ -68,8 +70,9 @@ class PosewaveHeader(Record):
         Int8ul, "bits 0-3: start table of the model, 0 or 1; 4-7: number of the prior; 0: none"
     )
     flags: int = field(
-        bounded(Int8ul, 0, 3),
-        "bit 0: rows may have finer steps of their own; 1: whole turns are in the metric",
+        bounded(Int8ul, 0, 7),
+        "bit 0: rows may have finer steps of their own; 1: whole turns are in the metric; "
+        "2: rotation vectors stand for three angles",
     )  # PWAVE-08
     step: float = field(
         bounded(Float32l, 2.0**-60, 2.0**60),
@@ -193,7 +196,7 @@ def parse_posewave_header(header: bytes, layout: Layout) -> Header:
     ):
         if len(codes) not in (0, due):  # PWAVE-13, PWAVE-14
             raise FormatError(f"{NAME}: {len(codes)} of {name}, {due} are due")
-    orders = _orders(fields.orders, skeleton)
+    orders = joint_codes(fields.flags, fields.orders, skeleton)
     exact = _exact_mask(fields.exact, layout)
     if fields.exact and fields.contacts:  # PWAVE-39
         raise FormatError(f"{NAME}: contacts and exact channels")
@@ -246,15 +249,33 @@ def _prior(number: int, n_channels: int) -> Prior | None:
     return prior
 
 
-def _orders(fields: Sequence[AxisOrderFields], skeleton: Skeleton) -> dict[int, int]:
+def joint_codes(
+    flags: int, records: Sequence[AxisOrderFields], skeleton: Skeleton
+) -> dict[int, int]:
     """Codes by joint; raises FormatError for joints that cannot have one."""
-    joints = [order.joint for order in fields]
+    joints = [record.joint for record in records]
     ends = [-1, *joints, skeleton.n_joints]
     if any(after <= before for before, after in pairwise(ends)):  # PWAVE-15
         raise FormatError(f"{NAME}: axis orders of joints {joints} of {skeleton.n_joints}")
-    codes = {order.joint: order.code for order in fields}
+    codes = {record.joint: record.code for record in records}
     check_orders(codes, skeleton, NAME)
-    return codes
+    if flags & VECTORS:
+        codes = vector_codes(skeleton) | codes  # PWAVE-43
+    return {joint: code for joint, code in sorted(codes.items()) if code}
+
+
+def order_settings(
+    codes: Mapping[int, int], skeleton: Skeleton
+) -> tuple[int, list[AxisOrderFields]]:
+    """The flag of vectors, or 0, and the fewest records that give these ``codes`` by joint."""
+    usual = vector_codes(skeleton)
+    odd = {
+        joint: codes.get(joint, 0)
+        for joint in {*usual, *codes}
+        if codes.get(joint, 0) != usual.get(joint, 0)
+    }
+    flag, records = (VECTORS, odd) if len(odd) < len(codes) else (0, codes)
+    return flag, [AxisOrderFields(joint=j, code=records[j]) for j in sorted(records)]
 
 
 def _spread(octaves: int) -> float:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcz.codecs.posewave.trigonometry import BEYOND, RULES
+from mcz.codecs.posewave.trigonometry import BEYOND, RULES, VECTOR
 from mcz.errors import FormatError, MotionError
 from mcz.kinematics.angles import FULL_TURN
 from mcz.model.motion import QUATERNION_KINDS, ROTATION_KINDS, VECTOR_KINDS, Joint, Skeleton
@@ -31,7 +31,8 @@ SEQUENCES: tuple[AxisSequence, ...] = (
     (2, 0, 1),
     (2, 1, 0),
 )
-N_ORDERS = len(SEQUENCES)  # code n: SEQUENCES[n - 1]
+CODED = (*SEQUENCES, (VECTOR, VECTOR, VECTOR))  # code n: CODED[n - 1]
+N_ORDERS = VECTOR_CODE = len(CODED)
 N_NOTES = 4  # kinds: a switch, turns about x, y, z
 MAX_TURNS = 2**41
 PRICE = 0.25  # of a switch, in turns
@@ -74,6 +75,15 @@ def columns_by_axis(skeleton: Skeleton, index: int) -> list[int]:
     return [start + kinds.index(kind) for kind in ROTATION_KINDS]
 
 
+def vector_codes(skeleton: Skeleton) -> dict[int, int]:
+    """The codes of a header with the flag of vectors and without records."""
+    return {
+        index: VECTOR_CODE
+        for index, joint in enumerate(skeleton.joints)
+        if joint.parent >= 0 and own_sequence(joint, skeleton) is not None
+    }
+
+
 def check_orders(codes: Mapping[int, int], skeleton: Skeleton, where: str) -> None:
     """Raises FormatError for a joint that cannot have an order."""
     for index, code in codes.items():
@@ -97,8 +107,12 @@ class Orders:
         for place in self.places:
             if not (np.abs(values[:, place.columns]) < BEYOND).all():
                 raise MotionError("posewave: an angle of 2^40 or more in another order of axes")
-            angles = self._reorder_axes(values, place, place.own, place.coded)
-            kernels().follow_angles(angles, place.coded, self.full, nothing)
+            if place.coded[0] == VECTOR:
+                angles = np.ascontiguousarray(values[:, place.columns])
+                kernels().follow_vectors(angles, place.own, self.full, self.rule)
+            else:
+                angles = self._reorder_axes(values, place, place.own, place.coded)
+                kernels().follow_angles(angles, place.coded, self.full, nothing)
             coded[:, place.columns] = angles
         return coded
 
@@ -140,7 +154,7 @@ class Orders:
 def _reordered_joint(skeleton: Skeleton, index: int, code: int) -> ReorderedJoint:
     columns = columns_by_axis(skeleton, index)
     own = own_sequence(skeleton.joints[index], skeleton)
-    return ReorderedJoint(*(np.array(x, np.int64) for x in (columns, SEQUENCES[code - 1], own)))
+    return ReorderedJoint(*(np.array(x, np.int64) for x in (columns, CODED[code - 1], own)))
 
 
 def _build_notes(notes: Ints) -> bytes:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcz.codecs.posewave.skeleton_plan import MAX_PATH, QUATERNION, VECTOR, Plan
-from mcz.codecs.posewave.trigonometry import BEYOND, sine_cosine
+from mcz.codecs.posewave.skeleton_plan import MAX_PATH, QUATERNION, Plan
+from mcz.codecs.posewave.trigonometry import BEYOND, LONGEST, VECTOR, exponential, sine_cosine
 from mcz.kernels.types import Floats, Floats2, Floats3
 
 
@@ -249,38 +249,7 @@ def _own_inertia(
         inertia[9, p] = (d0 * g + d1 * h + d2 * i) - (y * t + v * z)
 
 
-LONGEST = 256.0  # the square of a vector's length in radians from which on it counts as 0
 LEAST = 2.0**-100  # the square of a quaternion's length below which it turns nothing
-HALVINGS = (0, 1, 2, 3)
-# Of the Taylor series, the last factor first: 1 / (k (k + 1)).
-FIRST = tuple(1.0 / (k * (k + 1.0)) for k in (16.0, 14.0, 12.0, 10.0, 8.0, 6.0, 4.0, 2.0))
-SECOND = tuple(1.0 / (k * (k + 1.0)) for k in (17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0))
-THIRD = tuple(1.0 / (k * (k + 1.0)) for k in (18.0, 16.0, 14.0, 12.0, 10.0, 8.0, 6.0, 4.0))
-SIXTH = 0.16666666666666666
-
-
-def exponential(square: float) -> tuple[float, float, float]:
-    """sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3 of t^2, which is below 256.
-
-    Those of a sixteenth of t by their series, then doubled four times.
-    """
-    q = square * 0.00390625
-    a = b = c = 1.0
-    for factor in FIRST:
-        a = 1.0 - q * a * factor
-    for factor in SECOND:
-        b = 1.0 - q * b * factor
-    for factor in THIRD:
-        c = 1.0 - q * c * factor
-    b = b * 0.5
-    c = c * SIXTH
-    for _ in HALVINGS:
-        c = (c + a * b) * 0.25
-        cosine = 1.0 - q * b
-        b = a * a * 0.5
-        a = a * cosine
-        q = q * 4.0
-    return a, b, c
 
 
 def turn_by_vector(

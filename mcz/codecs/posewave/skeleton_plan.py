@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.orders import SEQUENCES
-from mcz.codecs.posewave.trigonometry import BEYOND, RULES, Rule, sine_cosine
+from mcz.codecs.posewave.orders import CODED
+from mcz.codecs.posewave.trigonometry import BEYOND, RULES, VECTOR, Rule, sine_cosine
 from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints2
 from mcz.kinematics.points import points_of
 from mcz.model.motion import (
@@ -37,7 +37,7 @@ Turn = tuple[int, int, int]  # axis, column, number among the kept
 MAX_PATH = 96  # channels from the first of a block down to a channel, itself included
 LEAST_REGULARIZATION, GREATEST_REGULARIZATION = 2.0**-100, 2.0**100
 PLAIN = -1
-QUATERNION, VECTOR = 3, 4  # as axes of turns
+QUATERNION = 3  # as an axis of turns, like VECTOR
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 N_INERTIA = 10  # mass, first moment x y z, inertia xx yy zz xy xz yz
 
@@ -247,7 +247,11 @@ def _turns(
         ]
         if index in orders:
             by_axis = {turn[0]: turn for turn in own}
-            turns += [by_axis[axis] for axis in SEQUENCES[orders[index] - 1]]
+            coded = CODED[orders[index] - 1]
+            if coded[0] == VECTOR:
+                turns += [(VECTOR, *by_axis[part][1:]) for part in range(3)]
+            else:
+                turns += [by_axis[axis] for axis in coded]
         else:
             parts = [[turn] for turn in own] + (_whole(joint, column, numbers) if whole else [])
             parts.sort(key=lambda part: min(column for _, column, _ in part))

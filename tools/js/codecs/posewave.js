@@ -1,6 +1,6 @@
 // SPEC.md, "Codec 3: posewave": wavelets in time, in the metric of the pose.
 
-import { AxisOrders } from "../axis-orders.js";
+import { AxisOrders, turnsOf } from "../axis-orders.js";
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder } from "../entropy.js";
 import { Refused } from "../errors.js";
@@ -10,6 +10,7 @@ import { Holder } from "../pose-holding.js";
 import { Pyramid, Walk } from "../pose-levels.js";
 import { RowDecoder } from "../pose-rows.js";
 import { priorOf } from "../pose-prior.js";
+import { VECTOR } from "../pose-metric.js";
 import { HEAD, startTable } from "../pose-start.js";
 import { stepOf } from "../scales.js";
 import { decodeAlone } from "./fast.js";
@@ -21,6 +22,7 @@ export const version = 1;
 /** Bits of the flags. */
 const REFINING = 1;
 const WHOLE_TURNS = 2;
+const VECTORS = 4;
 
 const MAX_LEVELS = 8;
 const MAX_SHELL = 16;
@@ -28,7 +30,6 @@ const SPREADS = 32;
 const MAX_FINE = 24;
 const START_TABLES = 16;
 const MAX_START = 1;
-const MAX_ORDER = 6;
 const GREATEST_LENGTH = 2 ** 60;
 
 /** Kinds of channels of the registry, where positions, rotations and others begin. */
@@ -75,7 +76,7 @@ function readHeader(bytes, skeleton, groups) {
   const levels = upTo(reader, MAX_LEVELS, "levels");
   const borrowing = upTo(reader, levels, "borrowed levels");
   const [start, prior] = readStart(reader, channels.length);
-  const flags = upTo(reader, REFINING | WHOLE_TURNS, "as flags");
+  const flags = upTo(reader, REFINING | WHOLE_TURNS | VECTORS, "as flags");
   const refining = (flags & REFINING) !== 0;
   const whole = (flags & WHOLE_TURNS) !== 0;
   const step = reader.f32();
@@ -93,7 +94,7 @@ function readHeader(bytes, skeleton, groups) {
   const kinds = Uint8Array.from(channels, (channel) => kindOf(channel, whole));
   const plain = readSteps(reader, kinds.filter((kind) => kind === PLAIN).length);
   const weights = readSteps(reader, joints.length);
-  const orders = readOrders(reader, joints.length);
+  const orders = readOrders(reader, skeleton, (flags & VECTORS) !== 0);
   const exactGroups = readExact(reader, groups.length);
   const contacts = reader.counted(() => readContacts(reader, skeleton));
   if (contacts.length > 1) reader.refuse(`${contacts.length} times contacts`);
@@ -140,15 +141,19 @@ function readStart(reader, nChannels) {
   return [start, prior];
 }
 
-/** The codes of axis orders of so many joints, 0 where the header has none. */
-function readOrders(reader, nJoints) {
-  const codes = new Uint8Array(nJoints);
+/** The codes of axis orders of all joints, 0 where they have none; `vectors`: most are vectors. */
+function readOrders(reader, skeleton, vectors) {
+  const { joints } = skeleton;
+  const mayTurn = joints.map((joint) => turnsOf(joint, skeleton) !== null);
+  const codes = Uint8Array.from(joints, ({ parent }, j) =>
+    vectors && mayTurn[j] && parent >= 0 ? VECTOR : 0,
+  );
   let last = -1;
   reader.counted(() => {
     const joint = reader.varint();
-    if (joint <= last || joint >= nJoints) reader.refuse(`an axis order of joint ${joint}`);
-    codes[joint] = upTo(reader, MAX_ORDER, "is an axis order");
-    if (codes[joint] === 0) reader.refuse("0 is an axis order");
+    if (joint <= last || joint >= joints.length) reader.refuse(`an axis order of joint ${joint}`);
+    if (!mayTurn[joint]) reader.refuse(`an axis order of joint ${joint}, which can have none`);
+    codes[joint] = upTo(reader, VECTOR, "is an axis order");
     last = joint;
   });
   return codes;
