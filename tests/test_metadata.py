@@ -10,6 +10,7 @@ import zlib
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -357,3 +358,51 @@ def test_what_is_purged_may_be_said_of_the_file(archive: Path, call: Call) -> No
     size = archive.stat().st_size
     assert "purged" in call("meta", archive, "--purge").out
     assert archive.stat().st_size == size and mcz.verify(archive) == []
+
+
+def described(path: Path, call: Call, *words: str) -> tuple[dict[str, Any], str]:
+    code, out, errors = call("meta", str(path), "--to", *words)
+    assert code == 0
+    return json.loads(out), errors
+
+
+def test_records_for_repositories(archive: Path, call: Call) -> None:
+    """Properties come from the file, or from what all clips state alike."""
+    record, errors = described(archive, call, "datacite")
+    assert record["types"]["resourceTypeGeneral"] == "Dataset"
+    assert [line.split("requires ")[1].split(",")[0] for line in errors.splitlines()] == [
+        "creators",
+        "titles",
+        "publisher",
+        "publicationYear",
+    ]
+    of_file = {"title": "Walks", "lab": "Motion Lab", "published": "2026-03", "contact": "Library"}
+    with mcz.open(archive) as file:
+        names = [clip.name for clip in file]
+    of_clips = {
+        name: {"licence": "CC-BY-4.0", "date": f"2014-05-{day}", "keywords": "gait; walk"}
+        for day, name in enumerate(names, 10)
+    }
+    mcz.set_metadata(archive, of_clips | {"": of_file})
+    record, errors = described(archive, call, "datacite")
+    assert not errors
+    assert record["publicationYear"] == "2026"
+    assert record["rightsList"][0]["rightsIdentifier"] == "CC-BY-4.0"
+    assert record["dates"] == [
+        {"date": f"2014-05-10/2014-05-{9 + len(names)}", "dateType": "Collected"}
+    ]
+    assert [row["subject"] for row in record["subjects"]] == ["gait", "walk"]
+    mcz.set_metadata(archive, {names[0]: {"licence": "CC0-1.0"}})
+    crate, errors = described(archive, call, "ro-crate")
+    assert "requires description" in errors and "requires license" in errors
+    entities = {entity["@id"]: entity for entity in crate["@graph"]}
+    assert entities["./"]["hasPart"] == [{"@id": "a.mcz"}]
+    assert entities["a.mcz"]["contentSize"] == str(archive.stat().st_size)
+    assert entities["#lab"]["name"] == "Motion Lab"
+    clips = [entities[part["@id"]] for part in entities["a.mcz"]["hasPart"]]
+    assert [clip["name"] for clip in clips] == names and clips[0]["license"] == "CC0-1.0"
+    crate, _ = described(archive, call, "ro-crate", "--clip", names[1])
+    assert {"@id": "https://spdx.org/licenses/CC-BY-4.0"} in [
+        entity.get("license") for entity in crate["@graph"]
+    ]
+    assert call("meta", str(archive), "--to", "datacite", "--set", "title=x").code == 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING
@@ -91,6 +91,11 @@ def _to_pairs(
     "--purge", is_flag=True,
     help="Rewrite the file without any earlier metadata."
 )  # fmt: skip
+@click.option(
+    "--to", "form", type=click.Choice(("datacite", "ro-crate")),
+    help="Print a record for a repository, as JSON; required properties that the file does not "
+    "state are named on standard error."
+)  # fmt: skip
 @json_option
 def meta_command(
     file: str,
@@ -106,6 +111,7 @@ def meta_command(
     rate: Fraction | float | None,
     force: bool,
     purge: bool,
+    form: str | None,
     as_json: bool,
 ) -> Exit:
     """Show or edit the metadata of clips in FILE.mcz, without rewriting their data.
@@ -118,6 +124,11 @@ def meta_command(
         raise Failure("--file is about no clip", Exit.USAGE)
     if set(pairs) & set(removed):
         raise Failure(f"{sorted(set(pairs) & set(removed))[0]} is set and removed", Exit.USAGE)
+    if form and (pairs or removed or table or rate or purge or of_file):
+        raise Failure("--to prints a record, and changes nothing", Exit.USAGE)
+    if form:
+        with opened(file) as opened_file, about(file):
+            return _describe(opened_file, opened_file.chosen(clips or None, where), form)
     if not (pairs or removed or table or rate or purge):
         with opened(file) as opened_file:
             return _show(opened_file, _select_clips(opened_file, clips, where, of_file), as_json)
@@ -160,6 +171,16 @@ def _show(file: File, chosen: Mapping[str, Clip | None], as_json: bool) -> Exit:
         if pairs or len(shown) == 1:
             echo(f"{name}:" if name else "the file:")
             echo(*(f"  {key}: {value}" for key, value in pairs.items()))
+    return Exit.FINE
+
+
+def _describe(file: File, clips: Sequence[Clip], form: str) -> Exit:
+    from mcz.exchange.descriptions import describe
+
+    record, missing = describe(file, clips, form)
+    print_json(record)
+    for name, key in missing.items():
+        say(f"{file.name}: {form} requires {name}, which --file --set {key}=... states")
     return Exit.FINE
 
 

@@ -218,6 +218,7 @@ KEYS = {
     "consent": "text",
     "contact": "text",
     "doi": "DOI",
+    "published": "date",
     "mtime": "time",
 }
 SPELLINGS = {"license": "licence"}  # of keys that users may type
