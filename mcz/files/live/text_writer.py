@@ -9,7 +9,7 @@ from mcz.codecs import codec_by_name
 from mcz.container.writer import Sink
 from mcz.errors import OptionError, SourceError
 from mcz.files.live.writer import LiveWriter
-from mcz.files.reading.read import NONE, how_given
+from mcz.files.reading.read import NONE
 from mcz.files.reading.read import NOTE as SKELETON_NOTE
 from mcz.files.reading.source_files import SourceOptions, read_skeleton
 from mcz.files.writing.source_encoder import EncodingOptions, rate_notes
@@ -74,9 +74,6 @@ def begin_live(
     arriving, base = _open_source(_check_lines(lines), source_format, options)
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
     metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
-    if base is not None:
-        choice = (how_given(base), metadata.get(SKELETON_NOTE, ""))
-        metadata[SKELETON_NOTE] = "; ".join(filter(None, choice))
     writer = LiveWriter(
         sink,
         facing(in_unit(arriving.skeleton, options.unit), *options.axes),

@@ -48,7 +48,7 @@ def read(
     """The motion in a file of any source format, or in an MCZ file.
 
     An AMC finds its ASF next to it, or takes ``skeleton``, a path, a Skeleton or "none"; the
-    metadata state how it was found, and a SkeletonWarning reports a name or dofs that do not fit.
+    metadata state how one was found, and a SkeletonWarning reports a name or dofs that do not fit.
     ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
     ("x" to "-z"), state facts that the file lacks. ``arrays`` is the meaning of the numbers of a
     plain NPY or NPZ: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw".
@@ -75,7 +75,7 @@ def read(
 
 @dataclass(frozen=True, slots=True)
 class SkeletonChoice:
-    """A skeleton for a motion file: ``how`` it was found, and a remark, or "".
+    """A skeleton for a motion file: ``how`` it was found, "" if it was given, and a remark, or "".
 
     ``path`` is its file's, if it was read from one here.
     """
@@ -114,7 +114,7 @@ def read_motion(
     """Read the motion file ``path``, whose bytes are ``data`` if already read.
 
     ``given`` is the skeleton of a format that needs one: an object, the path of a file, "none" for
-    none, or None to search. The metadata state how it was found. Raises SourceError where no
+    none, or None to search. The metadata state how one was found. Raises SourceError where no
     skeleton can be chosen, and as ``read_source``; with ``flat`` a file with several possible
     skeletons nearby is read without one, and the metadata mention it.
     """
@@ -139,7 +139,9 @@ def read_motion(
 
 
 def with_note(motion: Motion, how: str) -> Motion:
-    """``motion`` with metadata on how its skeleton was found."""
+    """``motion`` with metadata on ``how`` its skeleton was found, "" where it was given."""
+    if not how:
+        return motion
     notes = "; ".join(filter(None, (how, motion.metadata.get(NOTE, ""))))
     return replace(motion, metadata=dict(motion.metadata) | {NOTE: notes})
 
@@ -162,13 +164,7 @@ def choose_skeleton(
 
 def _check_asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> SkeletonChoice:
     check_own(str(path), skeleton, label, counts)
-    return SkeletonChoice(skeleton, how_given(skeleton))
-
-
-def how_given(skeleton: Skeleton) -> str:
-    """The record of a skeleton that somebody named."""
-    name = _file_of(skeleton)
-    return f"ASF as given: {name}" if name else "skeleton as given"
+    return SkeletonChoice(skeleton, "")
 
 
 def _file_of(skeleton: Skeleton) -> str:
