@@ -109,17 +109,15 @@ ANSWERS = {
     ),
     "posewave": KnownAnswer(
         0, "all",
-        "03010000cdcc4c3d0000404048889102090000030103020603020000",
+        "04010004cdcc4c3d0000404048889102090000000000",
         (
-            (
-                "00ff7775f1dcd878f9da143293523e66796beffc76de903286eaaa5fb196ed6c35dcd8f2dd84"
-                "3df7cd12"
-            ),
-            "06d7daedceb9b7dfec873098c005a890aa2bbafd4f07c192c376e107",
-            "abbf97ab72aba38ff76116ea176ae654b506b8c8fe48fc74a78f56e315",
-            "195a098e4f617b6122c7796b95b8ccf0d0b5",
+            "00dae3a7d94e632abc741961da0d06f59f7f5712153ea813e9",
+            "624cb541fcb6eb7139d1d4e7d31cf7821f9168b74b3fbe89",
+            "04a41ac9eaf5b1b7c75d0ba6d2662a17116ef3db143c3e8211b5818ea95d",
+            "b648ad284f75dc6032ee3afb3fb53ebaed43fd8998bdb51dd521650128",
+            "1438a937262776640b7d835dfa9383cb04afa1",
         ),
-        "f0718572ce7234851409f20a67ace319ec9b0c8c3b94acc23b52d6fe953b8274",
+        "977194ee52dde1d4010ff5f1c0cb5c7c8327ca06798bba95e8c70b9fda292c8b",
     ),
     "mrdwt": KnownAnswer(
         0, "channel",
