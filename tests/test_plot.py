@@ -319,7 +319,7 @@ def test_any_numbers_are_plotted_or_refused(
         ("a.png", None, {"size": (9, 9)}, "64 to 4096"),
         ("a.png", None, {"theme": "x"}, "light, dark"),
         ("a.png", None, {"frames": (3, 99)}, "0 to 12"),
-        ("a.png", "rate-distortion", {"codecs": ["raw"]}, "nothing to turn"),
+        ("a.png", "rate-distortion", {"codecs": ["raw"]}, "no rate to vary"),
     ],
 )
 def test_options_are_checked(

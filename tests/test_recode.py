@@ -110,7 +110,7 @@ def test_a_lossless_clip_is_coded_anew_without_an_error() -> None:
     out = io.BytesIO()
     mcz.write(given, out, codec="best", segment_frames=15)
     data, part, edited = out.getvalue(), io.BytesIO(), io.BytesIO()
-    with pytest.raises(OptionError, match=r"with those of spine; recode=True codes them anew$"):
+    with pytest.raises(OptionError, match=r"with those of spine; recode=True encodes them again$"):
         mcz.extract(data, io.BytesIO(), joints=["hips"])
     found = mcz.extract(data, part, joints=["hips", "knee"], frames=(2, 20), recode=True)
     own = columns(clip(data), "hips", "knee")
@@ -237,7 +237,7 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole, part, table = tmp_path / "a.mcz", tmp_path / "b.mcz", tmp_path / "knee.csv"
     whole.write_bytes(write_bytes([motion()], "posewave"))
     assert run("extract", whole, part, "--joints", "knee") == 2
-    assert "--recode codes them anew" in capsys.readouterr().err
+    assert "--recode encodes them again" in capsys.readouterr().err
     assert not part.exists()
     assert run("extract", whole, part, "--joints", "knee", "--recode") == 0
     assert "joints knee, coded anew, data" in capsys.readouterr().out

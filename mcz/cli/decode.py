@@ -293,7 +293,10 @@ def convert_command(
     choice = DecodeOptions(**options)
     given = Input(file, max_decoded=max_decoded, facts=facts)
     suffix = suffix_of(output)
-    refuse(not suffix and choice.target is None, f"{output}: it has no suffix; --to says a format")
+    refuse(
+        not suffix and choice.target is None,
+        f"{output}: it has no suffix; use --to",
+    )
     if suffix != ".mcz" or choice.target is not None:
         refuse(
             not given.is_source and any(facts.values()),

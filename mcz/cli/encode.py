@@ -121,7 +121,7 @@ def _encode_piped(
         encode_lines(output, force, format_name, skeleton, **options)
         return Exit.FINE
     if output is None:
-        raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
+        raise Failure("standard input has no name; set the output with -o", Exit.USAGE)
     output = file_in(output, "-")
     with stored(format_name) as path:
         return _encode_file(path, output, skeleton, force, as_json, **options)
@@ -171,7 +171,7 @@ def _tell(target: str, written: Written, as_json: bool) -> None:
 
     needed, allowed = max(written.decoded_bytes, written.source_bytes), output_limit(written.size)
     if needed > allowed:
-        say(f"{target}: reading it takes --max-decoded {needed}, the default is {allowed}")
+        say(f"{target}: reading it needs --max-decoded {needed}, the default is {allowed}")
     if not as_json:
         echo(summary(target, written))
         for clip in written.clips:

@@ -121,7 +121,7 @@ def meta_command(
     """
     existing(file)
     if of_file and (clips or where or table or rate):
-        raise Failure("--file is about no clip", Exit.USAGE)
+        raise Failure("--file excludes --clip, --where, --from and --rate", Exit.USAGE)
     if set(pairs) & set(removed):
         raise Failure(f"{sorted(set(pairs) & set(removed))[0]} is set and removed", Exit.USAGE)
     if form and (pairs or removed or table or rate or purge or of_file):

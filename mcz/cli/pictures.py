@@ -176,7 +176,7 @@ def render_command(
     from mcz.files.writing.atomic import refuse_inputs
 
     if file == "-" and output is None:
-        raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
+        raise Failure("standard input has no name; set the output with -o", Exit.USAGE)
     suffix = ".gif" if options["sheet"] is None else ".png"
     target = file_in(output or str(Path(file).with_suffix(suffix)), file, suffix)
     refuse_inputs(target, (file, skeleton))
@@ -276,7 +276,7 @@ def plot_command(
     from mcz.files.writing.atomic import refuse_inputs
 
     if "-" in (file, other) and output is None:
-        raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
+        raise Failure("standard input has no name; set the output with -o", Exit.USAGE)
     if file == other == "-":
         raise Failure("only one of FILE and FILE2 can be standard input", Exit.USAGE)
     target = file_in(output or str(Path(file).with_suffix(".png")), file, ".png")

@@ -203,5 +203,5 @@ def bag_command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_j
 def _info_line(text: str) -> tuple[str, str]:
     name, is_pair, value = text.partition("=")
     if not is_pair:
-        raise Failure(f"--info {text}: NAME=TEXT is wanted", Exit.USAGE)
+        raise Failure(f"--info {text} is not NAME=TEXT", Exit.USAGE)
     return name, value

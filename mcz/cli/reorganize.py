@@ -97,7 +97,7 @@ def reorder_command(
     import mcz
 
     if not names and by is None:
-        raise Failure("name the clips that come first, or say --by", Exit.USAGE)
+        raise Failure("name the clips that come first, or use --by", Exit.USAGE)
     with about(file), Progress() as progress:
         report = mcz.reorder_clips(
             file, names, by=by, output=output, force=force, progress=progress

@@ -73,7 +73,7 @@ def replace_command(
     from mcz.files.writing.atomic import refuse_inputs
 
     if in_place == (output is not None):
-        raise Failure("name OUT.mcz, or say --in-place to change IN.mcz itself", Exit.USAGE)
+        raise Failure("name OUT.mcz, or use --in-place to change IN.mcz itself", Exit.USAGE)
     if "-" in (file, output, table):
         raise Failure("replace reads and writes files, not standard streams", Exit.USAGE)
     existing(file)

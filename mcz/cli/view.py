@@ -178,7 +178,7 @@ def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
         other, why = [key for key in OF_PAGE if options[key]], "with -o OUT.html"
     if other:
         shown = {"clips": "clip", "params": "param", "most": "max-size"}.get(other[0], other[0])
-        raise Failure(f"--{shown.replace('_', '-')} is taken {why}", Exit.USAGE)
+        raise Failure(f"--{shown.replace('_', '-')} applies only {why}", Exit.USAGE)
 
 
 def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str, port: int) -> Exit:
@@ -325,7 +325,7 @@ def _log_clips(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[Js
             continue
         rows.append({"file": file, "name": clip.name, "entity": entity, "n_frames": clip.n_frames})
     if unknown:
-        shelf.say(f"{plural(unknown, 'clip')}: which axis points up is unknown; --up says it")
+        shelf.say(f"{plural(unknown, 'clip')}: the up axis is unknown; set it with --up")
     if views:
         blueprint = import_extra("rerun.blueprint", "rerun")
         arranged = blueprint.Grid if len(views) <= MOST_BESIDE else blueprint.Tabs

@@ -80,7 +80,7 @@ def profile_named(name: str) -> Profile:
     for profile in PROFILES.values():
         if profile.name == name:
             return profile
-    raise OptionError(f"profile {name!r} is none of small, base and large", value=name)
+    raise OptionError(f"profile {name!r} is not small, base or large", value=name)
 
 
 def check(what: str, value: int, limit: int) -> None:
@@ -120,10 +120,10 @@ class Search:
         self.tried = 0
 
     def spend(self, n_bytes: int, n_received: int, what: str) -> None:
-        """Count ``came`` bytes as read; raises LimitError for too many."""
+        """Count ``n_bytes`` as read; raises LimitError for too many."""
         self.tried += n_bytes
         if self.tried > max(LEAST_TRIED, TRIED_PER_BYTE * n_received):
-            raise LimitError(f"too much looks like {what} and is none; {self.tried} bytes read")
+            raise LimitError(f"too many false starts of {what}; {self.tried} bytes read")
 
 
 FORMAT = 0, 99  # the draft of 1.0, which reads only itself

@@ -57,7 +57,7 @@ class ByteSource:
         """The ``size`` bytes at ``offset``; raises TruncatedError if the file ends before."""
         if offset + size > self.size:
             raise TruncatedError(
-                f"bytes {offset} to {offset + size} are wanted, but the file ends at {self.size}"
+                f"bytes {offset} to {offset + size} were read, but the file ends at {self.size}"
             )
         if size == 0:
             return b""

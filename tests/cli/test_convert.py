@@ -122,7 +122,7 @@ def test_to_and_from_mcz(folder: Path, call: Call) -> None:
         ("w.mcz", "v.mcz"): "mcz extract takes clips out of an .mcz",
         ("walk.bvh", "v.mcz", "--frames", "0:9"): "mcz extract takes parts",
         ("w.mcz", "v.csv", "--skeleton", "none"): "are of source files",
-        ("walk.bvh", "v"): "--to says a format",
+        ("walk.bvh", "v"): "use --to",
         ("walk.bvh", "v.trcc"): "did you mean .trc?",
     }
     for (name, output, *words), text in refused.items():

@@ -100,7 +100,7 @@ def dataset(
                 opened.pop(name).close()
         if not members:
             wanted = "" if window is None else f" of at least {window} frames"
-            raise OptionError(f"no clip{wanted} in what was given")
+            raise OptionError(f"no clip{wanted} in the given files")
         stack.pop_all()
     made = Dataset(settings, members, given, skipped)
     made.adopt(opened)
@@ -186,7 +186,7 @@ def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> 
         return len(frames)
     if member.source_rate is None:
         raise OptionError(
-            "its frame rate is unknown; say it with source_rate=",
+            "its frame rate is unknown; set source_rate=",
             path=member.target,
             clip=member.clip,
         )

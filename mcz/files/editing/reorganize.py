@@ -72,14 +72,14 @@ def delete_clips(
         if where is not None:
             named += [(CLIP, clip.name) for clip in file.find(where)]
         if not named:
-            raise OptionError("nothing to delete; name clips or say where", path=file.name)
+            raise OptionError("nothing to delete; name clips or give where", path=file.name)
         gone = dict.fromkeys(named)
         others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in gone]
         missed = [alias for _, alias in others if (ALIAS, alias) not in gone]
         if missed and not aliases:
             raise OptionError(
                 f"{list_some(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
-                "under another name, which would go, too; name it, or say aliases",
+                "under another name, which would be deleted, too; name it, or set aliases",
                 path=file.name,
             )
         gone |= dict.fromkeys(others)

@@ -135,5 +135,5 @@ def suffix_of(data: bytes, format_name: str | None) -> str:
     """The suffix of files of a source format, or the likely one of ``data``; OptionError."""
     formats = likely_formats(data) if format_name is None else (format_name,)
     if not formats:
-        raise OptionError("it looks like no known format; say which it is")
+        raise OptionError("unknown format; name it")
     return FORMATS[formats[0]].suffix

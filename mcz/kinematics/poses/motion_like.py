@@ -104,7 +104,7 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     if skeleton.unit_cm is None:
         raise OptionError(
             f"skeleton {skeleton.name!r}: its length unit is unknown, so it cannot be turned into "
-            f"{unit}; leave unit= out, or say it when reading"
+            f"{unit}; leave unit= out, or set it when reading"
         )
     return skeleton.unit_cm / unit_cm
 

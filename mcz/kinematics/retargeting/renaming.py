@@ -76,7 +76,7 @@ def with_offsets(given: Given, offsets: ArrayLike, unit_cm: float | None = None)
     if new_offsets.shape != (skeleton.n_joints, 3) or not np.isfinite(new_offsets).all():
         raise OptionError(
             f"offsets of shape {new_offsets.shape} for {skeleton.n_joints} joints: "
-            f"({skeleton.n_joints}, 3) finite numbers are wanted"
+            f"({skeleton.n_joints}, 3) finite numbers expected"
         )
     joints = tuple(
         replace(joint, offset=(x, y, z))

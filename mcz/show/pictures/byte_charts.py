@@ -185,7 +185,7 @@ def _points(motion: Motion, name: str, report: Callable[[int, str], None]) -> li
     """A point for each setting that works; raises OptionError if none does."""
     codec = codec_by_name(name)
     if codec.dial is None:
-        raise OptionError(f"codec {name} has nothing to turn: it is lossless, or has one setting")
+        raise OptionError(f"codec {name} has no rate to vary")
     points, why = [], ""
     for step, setting in enumerate(_settings(codec.dial)):
         text = f"{codec.dial.parameter}={setting:.4g}"

@@ -332,7 +332,7 @@ def kind_of(path: Path) -> str:
     motions = [source_format for source_format in FORMATS.values() if not source_format.is_skeleton]
     known = {MCZ: "mcz"} | {s: f.name for f in reversed(motions) for s in f.suffixes}
     if suffix not in known:
-        raise OptionError(f"its suffix is none of {' '.join(sorted(known))}", path=path)
+        raise OptionError(f"its suffix is not one of {' '.join(sorted(known))}", path=path)
     return known[suffix]
 
 

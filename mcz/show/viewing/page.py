@@ -112,7 +112,7 @@ def _build(folder: Path, npm: str, node: str, say: Callable[[str], None]) -> Non
             raise AccessError("another process builds the page; try again soon", path=folder)
         packages = folder / "node_modules" / ".package-lock.json"
         if not packages.is_file() or _is_older(packages, iter([folder / "package-lock.json"])):
-            say(f"fetching what the page is built with, once: npm ci in {folder}")
+            say(f"fetching the build tools of the page, once: npm ci in {folder}")
             _run([npm, *INSTALL], folder)
         say("building the page: node build.mjs")
         _run([node, "build.mjs"], folder)

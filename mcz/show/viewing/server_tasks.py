@@ -109,7 +109,7 @@ class Work:
     def _converted(self, folder: Path, paths: list[Path]) -> JsonObject:
         motions = [path for path in paths if path.suffix.lower() != ".asf"]
         if not motions:
-            raise Refused(400, "there is no motion file among what was given")
+            raise Refused(400, "no motion file was given")
         kinds = [kind_of(path) for path in motions]
         if "mcz" in kinds:
             raise OptionError("an .mcz needs no converting; the page reads it")

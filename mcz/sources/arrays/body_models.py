@@ -92,7 +92,7 @@ def offsets_of_model(
             f"joints of shape {joints.shape} for the {len(parents)} of kintree_table", path=file
         )
     if n_joints > len(parents):
-        raise OptionError(f"a model of {len(parents)} joints, and {n_joints} are wanted", path=file)
+        raise OptionError(f"a model of {len(parents)} joints; expected {n_joints}", path=file)
     _check_tree(file, parents, n_joints)
     return offsets_of_joints(joints[:n_joints], parents[:n_joints])
 
@@ -242,7 +242,7 @@ class _Model:
         if directions.ndim != 3 or directions.shape[:2] != (n_vertices, 3):
             raise SourceError(f"shapedirs of shape {directions.shape}", path=self.file)
         if betas.ndim != 1 or not np.isfinite(betas).all():
-            raise OptionError(f"betas of shape {betas.shape}: finite numbers in a row are wanted")
+            raise OptionError(f"betas of shape {betas.shape}: expected a row of finite numbers")
         n_shapes = directions.shape[2]
         if betas[n_shapes:].any():
             raise OptionError(f"{len(betas)} betas, and the model has {n_shapes}", path=self.file)

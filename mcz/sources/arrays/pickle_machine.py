@@ -125,7 +125,7 @@ class Machine:
 
     def pop(self) -> object:
         if len(self.stack) <= (self.marks[-1] if self.marks else 0):
-            self.refuse("the pickle takes what is not on its stack")
+            self.refuse("the pickle pops an empty stack")
         return self.stack.pop()
 
     def top(self) -> object:

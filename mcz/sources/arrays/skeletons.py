@@ -105,7 +105,7 @@ def body_skeleton(
         if offsets.shape != (body.n_joints, 3) or not np.isfinite(offsets).all():
             raise OptionError(
                 f"offsets of shape {offsets.shape} for the {body.n_joints} joints of {body.title}: "
-                f"({body.n_joints}, 3) finite numbers are wanted"
+                f"({body.n_joints}, 3) finite numbers expected"
             )
     joints = []
     for index, (name, parent) in enumerate(zip(body.names, body.parents, strict=True)):

@@ -115,7 +115,7 @@ def describe_outputs(outputs: Signal | None) -> Listed:
         three = channels[first : first + len(PARTS)]
         label, unit = three[0].name.removesuffix(f" {PARTS[0]}"), three[0].unit
         if [channel.name for channel in three] != [f"{label} {part}" for part in PARTS]:
-            raise MotionError(f"C3D has outputs of x, y and z, and {three[0].name!r} is none")
+            raise MotionError(f"C3D outputs have x, y and z; {three[0].name!r} does not")
         group = _list_of(unit, groups)
         listed, group_unit = groups.get(group, ([], unit))
         groups[group] = ([*listed, *({label} - {*listed})], unit if group_unit == unit else "")

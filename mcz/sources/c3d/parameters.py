@@ -184,7 +184,7 @@ def find_parameters(data: bytes) -> tuple[Order, int]:
     processor = data[start + 3]
     if processor not in (INTEL, DEC, SGI):
         raise SourceError(
-            f"processor {processor} is none of 84 (Intel), 85 (DEC), 86 (SGI)", offset=start + 3
+            f"processor {processor} is not 84 (Intel), 85 (DEC) or 86 (SGI)", offset=start + 3
         )
     return Order(processor), start
 

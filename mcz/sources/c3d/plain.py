@@ -39,7 +39,7 @@ def plain(motion: Motion) -> Motion:
     """
     for joint in motion.skeleton.joints:
         if joint.parent >= 0 or tuple(c.kind for c in joint.channels) != POSITION_KINDS:
-            raise MotionError(f"C3D has markers only, and joint {joint.name!r} is none")
+            raise MotionError(f"C3D holds markers only; joint {joint.name!r} is not a marker")
     others = {signal.role: signal for signal in motion.signals[1:]}
     if len(others) < len(motion.signals) - 1 or not set(others) <= set(KNOWN):
         given = ", ".join(signal.name for signal in motion.signals[1:])

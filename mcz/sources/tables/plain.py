@@ -29,10 +29,10 @@ def plain_trc(motion: Motion) -> Motion:
     for joint in skeleton.joints:
         kinds = tuple(channel.kind for channel in joint.channels)
         if joint.parent >= 0 or kinds != POSITION_KINDS:
-            raise MotionError(f"TRC holds markers alone, and joint {joint.name!r} is none")
+            raise MotionError(f"TRC holds markers only; joint {joint.name!r} is not a marker")
     unit = UNITS.get(skeleton.unit_cm or 0.0)
     if unit is None:
-        raise MotionError("TRC states a length unit: mm, cm or m; say which it is")
+        raise MotionError("TRC needs a length unit of mm, cm or m")
     rate = f"{float(_rate(motion)):.6f}"
     first = int(numbers_or_rows(motion.frame_numbers, motion.n_frames)[0]) if motion.n_frames else 1
     names = _names([joint.name for joint in skeleton.joints], motion.n_frames)
@@ -132,7 +132,7 @@ def _names(names: Sequence[str], n_frames: int) -> list[str]:
         if not name or name != name.strip() or any(ord(character) < 32 for character in name):
             raise MotionError(f"a table cannot hold the name {name!r}")
     if not n_frames:
-        raise MotionError("a table without rows of numbers is none")
+        raise MotionError("no rows of numbers")
     return list(names)
 
 
