@@ -109,15 +109,17 @@ ANSWERS = {
     ),
     "posewave": KnownAnswer(
         0, "all",
-        "04010004cdcc4c3d0000404048889102090000000000",
+        "0301000c8fc2753d00004040488b94020a0000000000",
         (
-            "00dae3a7d94e632abc741961da0d06f59f7f5712153ea813e9",
-            "624cb541fcb6eb7139d1d4e7d31cf7821f9168b74b3fbe89",
-            "04a41ac9eaf5b1b7c75d0ba6d2662a17116ef3db143c3e8211b5818ea95d",
-            "b648ad284f75dc6032ee3afb3fb53ebaed43fd8998bdb51dd521650128",
-            "1438a937262776640b7d835dfa9383cb04afa1",
+            (
+                "00ff7775fad91521af7bf10ccbf249e45784dee25736fbe06498ecfd435c8ea1064bb6c1c629"
+                "62e771e6829e"
+            ),
+            "0a374bdff9f52538e2dea2783104d69dc9d8d5034ec51f0c0fb42166",
+            "900ce004821bed8f926274d4793652627016df29da55ec0c0bcccc52",
+            "19c6581004ea0134283c79479e32ebd4e13cb6",
         ),
-        "977194ee52dde1d4010ff5f1c0cb5c7c8327ca06798bba95e8c70b9fda292c8b",
+        "f15bba14243eb9e0c96bfeeb9815af81597ef3cfaa638256cf2d819535c9d7a4",
     ),
     "mrdwt": KnownAnswer(
         0, "channel",

@@ -224,7 +224,7 @@ def test_a_preset_needs_a_unit_of_length() -> None:
     with pytest.raises(mcz.OptionError, match="step has to be given"):
         pair(unknown)
     encoder, decoder = pair(unknown, step=0.01)
-    assert np.abs(decoder.push(*encoder.push(motion.values[0])) - motion.values[0]).max() < 1
+    assert np.abs(decoder.push(*encoder.push(motion.values[0])) - motion.values[0]).max() < 3
 
 
 def test_nothing_changes_while_frames_come() -> None:

@@ -12,6 +12,13 @@ const { MOST_SIZE, Sizes, logOf } = sizing;
 const MAX_INDEX = 2 ** 30;
 const MOST_MEAN = 2 ** 31;
 const UNIT = 4096;
+const HALF = UNIT / 2;
+
+// Of dependent quantization: the state after an even integer and after an odd one.
+const NEXT = [
+  [0, 5, 1, 6, 2, 4, 3, 7],
+  [2, 7, 3, 4, 0, 6, 1, 5],
+];
 const BEFORE_ESCAPED = 48;
 const MOST_LENGTH = 32;
 const MAX_EXPONENT = 7;
@@ -68,8 +75,9 @@ class Level {
 /** Decodes the rows of one level after the other. */
 export class RowDecoder {
   /**
-   * @param {{classes: Uint8Array, refining: boolean, prior: object}} header classes of all channels,
-   *   whether rows have exponents, and a prior or null
+   * @param {{classes: Uint8Array, refining: boolean, dependent: boolean, prior: object}} header
+   *   classes of all channels, whether rows have exponents, whether quantization is dependent, and
+   *   a prior or null
    * @param {ArrayLike<number>} kept channels
    * @param {import("./entropy.js").Model} small of single bits, which the head has used
    * @param {import("./pose-start.js").Start} start
@@ -78,6 +86,7 @@ export class RowDecoder {
     const n = kept.length;
     const classes = Uint8Array.from(kept, (c) => header.classes[c]);
     this.refining = header.refining;
+    this.dependent = header.dependent;
     this.n = n;
     this.small = small;
     this.opinions = startOpinions(start, classes);
@@ -201,6 +210,7 @@ export class RowDecoder {
     let total = 0;
     let totalUsual = 0;
     let block = 0;
+    let state = 0;
     told.fill(0);
     across.means.fill(0);
     for (let c = 0; c < n; c++) {
@@ -210,14 +220,18 @@ export class RowDecoder {
       sizes.add(c, told);
       const mean = clamp((across.means[c] + timely[c]) * gain, -MOST_MEAN, MOST_MEAN);
       const fixed = Math.floor(mean * UNIT);
-      const rounded = Math.floor((fixed + UNIT / 2) / UNIT);
-      const value = this.integer(c, fixed, rounded);
-      if (Math.abs(value) > MAX_INDEX) throw new Refused(`${what}: ${value} is beyond 2^30`);
+      const odd = state % 2 === 1;
+      const among = odd ? fixed + clamp(fixed, -HALF, HALF) : fixed;
+      const rounded = Math.floor((among + HALF) / UNIT);
+      const integer = this.integer(c, among, rounded, odd);
+      if (Math.abs(integer) > MAX_INDEX) throw new Refused(`${what}: ${integer} is beyond 2^30`);
+      const value = odd ? integer - 0.5 * Math.sign(integer) : integer;
+      if (this.dependent) state = NEXT[integer & 1][state];
       values[c] = value / gain;
 
       const miss = (value - fixed / UNIT) / gain;
       const size = Math.min(0.5 * Math.abs(miss) + 0.5 * Math.abs(values[c]), MOST_SIZE);
-      magnitudes[c] = value === 0 && rounded === 0 ? 0 : size;
+      magnitudes[c] = integer === 0 && rounded === 0 ? 0 : size;
       found[c] = Math.min(Math.abs(miss), MOST_SIZE);
       for (let k = 3; k > 0; k--) told[k] = told[k - 1];
       told[0] = magnitudes[c];
@@ -233,16 +247,18 @@ export class RowDecoder {
    *
    * @param {number} fixed its mean, in 4096ths
    * @param {number} rounded the integer that is nearest to it
+   * @param {boolean} odd whether integers stand for 0 and the halves
    */
-  integer(c, fixed, rounded) {
+  integer(c, fixed, rounded, odd) {
     const { coder, opinions, kind, gain } = this;
     const { one, two } = this.sizes;
-    const logSize = logOf(0.5 * (one[c] + two[c]) * gain);
+    const finer = (size) => (odd ? size + Math.min(size, 0.5) : size);
+    const logSize = logOf(finer(0.5 * (one[c] + two[c]) * gain));
     const logMean = Math.min(logOf(Math.abs(fixed) / UNIT) >> 2, 3);
     const fraction = fixed - UNIT * rounded;
     const distance = Math.min(Math.abs(fraction) >> 8, 7);
     const near = Math.min(distance >> 1, 3);
-    this.setContexts(c, logOf(two[c] * gain), logSize, logMean, near);
+    this.setContexts(c, logOf(finer(two[c] * gain)), logSize, logMean, near);
 
     const scale = Math.min((3 * logSize) >> 3, N_SCALES - 1);
     const set = 8 * (4 * Math.min(logMean, 1) + near) + (scale >> 1);

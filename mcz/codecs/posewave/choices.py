@@ -19,6 +19,7 @@ from mcz.codecs.posewave.contact_plan import ContactsFields
 from mcz.codecs.posewave.contacts import ContactTracker
 from mcz.codecs.posewave.exact_channels import partition
 from mcz.codecs.posewave.header import (
+    DEPENDENT,
     MAX_FINE,
     NAME,
     REFINING,
@@ -58,8 +59,10 @@ from mcz.model.types import Floats, Params, Settings
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}
 RADIUS_CM = 3.0  # of the shell, as ACL measures it
 PROPORTION = 1 / 30  # of the shell to the skeleton where the unit is unknown: 3 cm of 90 cm
-GREATEST_DEGREES = 4.0  # fine steps beyond which the metric is meaningless
+GREATEST_DEGREES = 4.8  # fine steps beyond which the metric is meaningless
+GREATEST_FROM_CM = 0.03  # from this step on they are coarser
 SHELL = 8  # sixteenths
+DEPENDENT_STEP = 1.2  # steps of dependent quantization that err as a plain one does
 FINE_SPREAD, COARSE_SPREAD = 2, 3  # octaves above 2^-10
 COARSE_CM = 0.065  # from this step on the second start table is nearer
 SHARE_OF_CONSTANT = 0.25  # of a step: greatest effect of a constant channel on points
@@ -72,14 +75,14 @@ TRIAL_FRAMES = 2048
 SAMPLE_DISTANCE = 8  # frames between measured ones in a trial
 EXCHANGE = 0.75  # fall of bytes per rise of errors, in logarithms, for comparing trials
 STEPS_CM = 0.01, 0.045  # between these steps the weight of a bit goes from the first to the second
-RATE_WEIGHTS = 0.09, 0.14
+RATE_WEIGHTS = 0.072, 0.112
 USUAL = (  # steps, mean errors
     (0.0055, 0.03, 0.065, 0.14, 0.28, 0.56, 1.1, 2.2),
     (0.01, 0.046, 0.079, 0.13, 0.205, 0.32, 0.55, 0.9),
 )
 MEAN_TO_BOUND = 0.22  # the mean error with which a bound takes the fewest bytes
 STEP_OF_BOUND = 0.2  # live, where rows of frames that are farther off get finer ones
-COARSEST_WEIGHT = 0.12  # of a bit at level 0, whose errors affect later rows
+COARSEST_WEIGHT = 0.096  # of a bit at level 0, whose errors affect later rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,11 +205,11 @@ def weights_of(step_cm: float) -> Weights:
 def _header_fields(skeleton: Skeleton, step: float, step_cm: float) -> Settings:
     in_cm = step / step_cm  # length units a centimeter
     degree = math.pi / 180 if skeleton.angle_unit == "rad" else 1.0
-    first = 2 if step_cm <= FINE_CM else 0
+    first = 2 if step_cm <= FINE_CM else 1
     return {
         "start": (0 if step_cm < COARSE_CM else 1) + START_TABLES * number_of(skeleton),
-        "flags": WHOLE_TURNS if has_whole_turns(skeleton) else 0,
-        "step": step,
+        "flags": DEPENDENT + (WHOLE_TURNS if has_whole_turns(skeleton) else 0),
+        "step": step * DEPENDENT_STEP,
         "radius": RADIUS_CM * in_cm,
         "shell": SHELL + SPREADS * (FINE_SPREAD if step_cm < 0.1 else COARSE_SPREAD),
         "rotation": code_of(greatest_degrees(step_cm) * degree),
@@ -222,10 +225,7 @@ def _header_fields(skeleton: Skeleton, step: float, step_cm: float) -> Settings:
 
 def greatest_degrees(step_cm: float) -> float:
     """The greatest step of an angle, which grows with coarse steps."""
-    if step_cm < 0.1:
-        return GREATEST_DEGREES
-    usual = GREATEST_DEGREES * math.pow(step_cm / 0.05, 0.6)
-    return usual * (1.0 if step_cm < 0.15 else min(max(math.pow(step_cm / 0.4, 0.4), 1.0), 1.5))
+    return GREATEST_DEGREES * math.pow(max(step_cm / GREATEST_FROM_CM, 1.0), 0.72)
 
 
 def greatest_cm(step_cm: float) -> float:

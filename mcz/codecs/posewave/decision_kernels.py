@@ -32,15 +32,13 @@ COST_UNIT = 4096  # of a bit
 
 
 # Where an integer is coded: its level; sets of weights and second thoughts; contexts of its sign;
-# whether the side away from its mean is the negative one.
-Contexts = tuple[int, int, int, int, int, int, int, int]
-LEVEL, ONE, OTHER, SECOND, SIGN_1, SIGN_2, SIGN_3, DOWN = range(8)
+# whether the side away from its mean is the negative one; the mean, rounded.
+Contexts = tuple[int, int, int, int, int, int, int, int, int]
+LEVEL, ONE, OTHER, SECOND, SIGN_1, SIGN_2, SIGN_3, DOWN, ROUNDED = range(9)
 
 
-def predict_bit(
-    model: Model, slot: int, one: Ints, other: Ints, second: Ints
-) -> tuple[int, int, int]:
-    """The mixed chance of a 1, that after second thoughts, and the mixed one stretched."""
+def mix(model: Model, slot: int, one: Ints, other: Ints) -> int:
+    """The mixed chance of a 1, stretched, from 1 to 4095."""
     slots, at, inputs = model.slots, model.at, model.inputs
     stretch, trust = model.stretch, model.trust
     dot = (one[N_OPINIONS] + other[N_OPINIONS]) * BIAS
@@ -49,7 +47,14 @@ def predict_bit(
         trusted = (stretch[(known >> 12) & 4095] * trust[known & 255]) >> 16
         inputs[k] = trusted
         dot += (one[k] + other[k]) * trusted
-    x = min(max(dot >> 16, -LIMIT), LIMIT) + 2048
+    return int(min(max(dot >> 16, -LIMIT), LIMIT)) + 2048
+
+
+def predict_bit(
+    model: Model, slot: int, one: Ints, other: Ints, second: Ints
+) -> tuple[int, int, int]:
+    """The mixed chance of a 1, that after second thoughts, and the mixed one stretched."""
+    x = mix(model, slot, one, other)
     chance = model.squash[x & 4095]
     node, share = (x >> 7) & 31, x & 127
     later = (second[node] * (128 - share) + second[node + 1] * share) >> 7
@@ -137,26 +142,28 @@ def code_rest(coder: Ints, data: Bytes, size: int, bucket: int, level: int) -> i
     return FIRST_ESCAPED - 1 + rest
 
 
-def cost_of(model: Model, error: int, where: Contexts) -> int:
-    """Estimate the cost of ``code_error``, in units of ``COST_UNIT``, without side effects."""
-    one, other = model.weights[where[ONE]], model.weights[where[OTHER]]
-    second, costs = model.second[where[SECOND]], model.costs
-    _, chance, _ = predict_bit(model, 0, one[0], other[0], second[0])
-    if error == 0:
-        return int(costs[(65536 - chance) >> 4])
-    total = costs[chance >> 4]
+def costs_of(model: Model, slot: int, where: Contexts) -> tuple[int, int]:
+    """Estimate the costs of a 0 and of a 1, in units of ``COST_UNIT``, without side effects."""
+    one, other = model.weights[where[ONE], slot], model.weights[where[OTHER], slot]
+    chance = model.squash[mix(model, slot, one, other) & 4095]
+    return model.costs[(65536 - chance) >> 4], model.costs[chance >> 4]
+
+
+def cost_of_size(model: Model, error: int, where: Contexts) -> int:
+    """Estimate the cost of the rest of ``code_error`` for an error that is not 0."""
     far = (1 if error < 0 else 0) ^ where[DOWN] ^ 1
     signs = C_SIGN + where[SIGN_1], C_SIGN + where[SIGN_2], C_SIGN + where[SIGN_3]
     chance = mixed_chance(model.coder, M_SIGN + where[LEVEL], signs)
-    total += costs[(chance if far else 65536 - chance) >> 4]
+    total = model.costs[(chance if far else 65536 - chance) >> 4]
     model.at[0] += far * N_SLOTS
-    bucket, cost = bucket_of(abs(error)), 1
-    while cost < N_SLOTS:
-        _, chance, _ = predict_bit(model, cost, one[cost], other[cost], second[cost])
-        total += costs[(chance if bucket > cost else 65536 - chance) >> 4]
-        if bucket <= cost:
+    bucket, slot = bucket_of(abs(error)), 1
+    while slot < N_SLOTS:
+        last, more = costs_of(model, slot, where)
+        if bucket <= slot:
+            total += last
             break
-        cost += 1
+        total += more
+        slot += 1
     model.at[0] -= far * N_SLOTS
     if bucket >= 5:
         plain = (bucket - 3) >> 1 if bucket < N_SLOTS else 2 * bits(abs(error))

@@ -46,7 +46,7 @@ MAX_LEVELS = 8
 MAX_FINE = 24
 WHOLE_SHARE, SPREADS = 16, 32  # of ``shell``
 START_TABLES = 16  # of ``start``: reserved number
-REFINING, WHOLE_TURNS, VECTORS = 1, 2, 4  # of ``flags``
+REFINING, WHOLE_TURNS, VECTORS, DEPENDENT = 1, 2, 4, 8  # of ``flags``
 
 
 class AxisOrderFields(Record):
@@ -70,9 +70,9 @@ class PosewaveHeader(Record):
         Int8ul, "bits 0-3: start table of the model, 0 or 1; 4-7: number of the prior; 0: none"
     )
     flags: int = field(
-        bounded(Int8ul, 0, 7),
-        "bit 0: rows may have finer steps of their own; 1: whole turns are in the metric; "
-        "2: rotation vectors stand for three angles",
+        bounded(Int8ul, 0, 15),
+        "bit 0: rows have steps of their own; 1: whole turns in the metric; "
+        "2: rotation vectors stand for three angles; 3: dependent quantization",
     )  # PWAVE-08
     step: float = field(
         bounded(Float32l, 2.0**-60, 2.0**60),
@@ -131,6 +131,7 @@ class Header:
     prior: Prior | None
     refining: bool
     whole: bool
+    dependent: bool
     step: float
     radius: float
     shell: float
@@ -221,6 +222,7 @@ def parse_posewave_header(header: bytes, layout: Layout) -> Header:
         prior=_prior(number, layout.n_channels),
         refining=bool(fields.flags & REFINING),
         whole=whole,
+        dependent=bool(fields.flags & DEPENDENT),
         step=fields.step,
         radius=fields.radius,
         shell=fields.shell % SPREADS / WHOLE_SHARE,

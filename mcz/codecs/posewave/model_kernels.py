@@ -7,49 +7,36 @@ only.
 
 from __future__ import annotations
 
-import numpy as np
-
 from mcz.codecs.coding import mixing
 from mcz.codecs.coding.mixing import adaptive, mixed
-from mcz.codecs.posewave.decision_kernels import (
-    COST_UNIT,
-    Contexts,
-    code_error,
-    cost_of,
-    mixed_chance,
+from mcz.codecs.posewave.channel_kernels import (
+    expect,
+    forget_block,
+    next_state,
+    note_magnitude,
+    twice_value,
 )
+from mcz.codecs.posewave.decision_kernels import ROUNDED, code_error
 from mcz.codecs.posewave.model_state import (
-    BEFORE_1,
-    BEFORE_2,
     C_EXPONENT,
     C_FLAG,
-    C_LEVEL,
-    C_MEAN,
-    C_ROWS,
     M_FLAG,
     MAX_EXPONENT,
     MAX_INDEX,
-    N_OWN,
-    N_SCALES,
-    N_SETS,
-    N_SHARED,
-    N_SLOTS,
-    PARENT,
-    PARENT_NEXT,
+    PATH_MEAN,
+    PATH_ROW,
+    PATH_SCALED,
+    PATH_SIDE,
+    PATH_SIZE,
+    PATH_TOTAL,
     ROW,
-    ROW_BEFORE,
-    ROW_PARENT,
     SCALED,
     SIDE_1,
-    SIDE_2,
-    SIDE_3,
-    SIDE_4,
     USUAL,
     Model,
 )
 from mcz.codecs.posewave.prediction_kernels import (
     FOUND,
-    LEAST_SIZE,
     MEMORY,
     MOST_SIZE,
     ONE,
@@ -62,13 +49,9 @@ from mcz.codecs.posewave.prediction_kernels import (
     spread,
     take_in,
 )
+from mcz.codecs.posewave.search_kernels import choose_row
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
-
-UNIT = 4096.0  # a mean is a multiple of 1 / UNIT
-MOST_MEAN = float(1 << 31)
-NO_CHOICE = -1.0  # as ``lam``: the integers are given
-FAULTY = -1.0
 
 
 @kernel
@@ -77,7 +60,6 @@ def code_rows(
     data: Bytes,
     q: Ints2,
     y: Floats2,
-    means: Floats2,
     here: Floats2,
     parent: Floats2,
     grand: Floats2,
@@ -87,59 +69,51 @@ def code_rows(
     lam: float,
     exponents: Ints,
     refining: int,
+    dependent: int,
 ) -> int:
     """Code the rows ``first`` to ``last`` of a level in place; return the row of a fault, or -1.
 
-    ``q`` and ``means`` (rows, n) are the integers and what the model took for their means; ``y``
-    (rows, n) is what an encoder quantizes, with ``lam`` >= 0, as so many squares of a step as a bit
-    is worth; with ``NO_CHOICE``, and in a decoder, it is not looked at. ``here`` (3 + rows, 2
-    wide) are magnitudes and values of this level's rows, all of it written here but the three rows
-    of zeros in front; ``parent`` and ``grand`` those of the two coarser levels, without their
-    rows of zeros, or one row of zeros. ``exponents`` (rows,) say how much finer than the level's
-    the step of a row is, 2^-s; they are coded where ``refining`` is 1, and otherwise 0.
+    ``q`` (rows, n) are twice the values, in steps; ``y`` (rows, n) is what an encoder quantizes,
+    with ``lam``, as so many squares of a step as a bit is worth. ``here`` (3 + rows, 2 wide) are
+    magnitudes and values of this level's rows, all of it written here but the three rows of zeros
+    in front; ``parent`` and ``grand`` those of the two coarser levels, without their rows of zeros,
+    or one row of zeros. ``exponents`` (rows,) say how much finer than the level's the step of a row
+    is, 2^-s; they are coded where ``refining`` is 1, and otherwise 0. ``dependent``: 1 where each
+    integer decides among which numbers the next value is.
     """
-    coder, n = model.coder, len(model.classes)
-    chooses = coder[mixing.ENCODING] != 0 and lam >= 0.0
+    coder, chooses = model.coder, model.coder[mixing.ENCODING] != 0
     for row in range(first, last):
         flags = flag_contexts(model, here, parent, level, row)
-        live = 0
+        exponent, live = exponents[row], 0
         if chooses:
-            live = (
-                1
-                if is_live(
-                    model, data, q, y, means, here, parent, grand, level, row, lam, flags, exponents
-                )
-                else 0
+            live = choose_row(
+                model,
+                q[row],
+                y[row],
+                here,
+                parent,
+                grand,
+                level,
+                row,
+                lam,
+                exponent,
+                flags,
+                dependent,
             )
-        else:
-            for c in range(n):
-                live |= 1 if q[row, c] != 0 else 0
         if mixed(coder, data, live, M_FLAG + level, flags[0], flags[1], flags[2]) == 0:
             q[row] = 0
-            means[row] = 0.0
             here[row + 3] = 0.0
             exponents[row] = 0
             continue
         if refining:
             earlier = exponents[row - 1] if row > 0 else 0
-            exponents[row] = code_exponent(coder, data, exponents[row], earlier)
-        cost = code_row(
-            model,
-            data,
-            q[row],
-            y[row if chooses else 0],
-            means[row],
-            here,
-            parent,
-            grand,
-            level,
-            row,
-            lam,
-            exponents[row],
-            False,
-        )
-        if cost == FAULTY:
+            exponents[row] = code_exponent(coder, data, exponent, earlier)
+        if not chooses:
+            gather_magnitudes(model, here, parent, grand, level, row)
+            predict_in_time(model, here, parent, level, row)
+        if code_row(model, data, q[row], here[row + 3], level, exponents[row], dependent) != 0:
             return row
+        learn_from_row(model, here, level, row)
         model.seen[0] = model.seen[0] * MEMORY + 1.0  # ROWS-02
     return -1
 
@@ -176,164 +150,49 @@ def flag_contexts(
     )
 
 
-def is_live(
-    model: Model,
-    data: Bytes,
-    q: Ints2,
-    y: Floats2,
-    means: Floats2,
-    here: Floats2,
-    parent: Floats2,
-    grand: Floats2,
-    level: int,
-    row: int,
-    lam: float,
-    flags: tuple[int, int, int],
-    exponents: Ints,
-) -> bool:
-    """An encoder's choice whether to code a row or to let all of it be zero."""
-    n = len(model.classes)
-    energy, most = 0.0, 0.0
-    for c in range(n):
-        energy += y[row, c] * y[row, c]
-        most = max(most, abs(y[row, c]))
-    if most < 0.5:
-        return False
-    if most >= 2.0 or energy >= 4.0 + 0.1 * n:
-        return True
-    cost = code_row(
-        model,
-        data,
-        q[row],
-        y[row],
-        means[row],
-        here,
-        parent,
-        grand,
-        level,
-        row,
-        lam,
-        exponents[row],
-        True,
-    )
-    some = False
-    for c in range(n):
-        some = some or q[row, c] != 0
-    chance = mixed_chance(model.coder, M_FLAG + level, flags)
-    saved = model.costs[chance >> 4] - model.costs[(65536 - chance) >> 4]
-    return some and cost + lam * float(saved) / COST_UNIT < energy
-
-
 def code_row(
-    model: Model,
-    data: Bytes,
-    q: Ints,
-    y: Floats,
-    means: Floats,
-    here: Floats2,
-    parent: Floats2,
-    grand: Floats2,
-    level: int,
-    row: int,
-    lam: float,
-    exponent: int,
-    trial: bool,
-) -> float:
-    """Code a live row; return its cost to an encoder that chooses, or FAULTY.
+    model: Model, data: Bytes, q: Ints, row: Floats, level: int, exponent: int, dependent: int
+) -> int:
+    """Code a live row, of which the model knows the surroundings; return 1 for a fault, else 0.
 
-    A ``trial`` chooses and learns nothing. What is remembered is in steps of the level, of which
-    one is 2^``exponent`` of the row's own.
+    ``row`` (2 wide,) are its magnitudes and values in steps of the level, of which one is
+    2^``exponent`` of the row's own.
     """
     n, blocks, width = len(model.classes), len(model.columns), len(model.timely)
-    chooses = model.coder[mixing.ENCODING] != 0 and lam >= 0.0
     gain = float(1 << exponent)
-    gather_magnitudes(model, here, parent, grand, level, row)
-    predict_in_time(model, here, parent, level, row)
-    logs, features, timely, usual = model.logs, model.features, model.timely, model.features[USUAL]
+    features, usual = model.features, model.features[USUAL]
     one, two, found = model.sizes[ONE], model.sizes[TWO], model.sizes[FOUND]
-    weights, own = model.level_weights[level], model.own_weights
-    magnitudes, values = here[row + 3, :width], here[row + 3, width:]
-    across, at = model.means, model.at
-    side_1 = side_2 = side_3 = side_4 = 0.0
-    row_before, row_parent = features[ROW_BEFORE, 0], features[ROW_PARENT, 0]
-    around = min(log_of(logs, (row_before + row_parent) * gain) // 4, 7) * 8
-    total = total_usual = cost = 0.0
-    block, start, stop = -1, 0, 0
+    paths, path = model.paths[0], model.paths[0, 0]
+    path[:] = 0.0
+    total_usual = 0.0
+    state, block, start, stop = 0, -1, 0, 0
     for c in range(n):
         if c == stop:
             block, start, stop = block + 1, stop, (block + 2) * n // blocks
-            across[:] = 0.0
-        mean = min(max((across[c - start] + timely[c]) * gain, -MOST_MEAN), MOST_MEAN)
-        fixed = int(np.floor(mean * UNIT))
-        mean = float(fixed) / UNIT
-        rounded = (fixed + 2048) >> 12
-        fraction = fixed - (rounded << 12)
-        row_mean = total / float(c) if c > 3 else row_before
-        scaled = usual[c] * (total + row_before + 0.1) / (total_usual + row_before + 0.1)
-        features[SIDE_1, c] = side_1
-        features[SIDE_2, c] = side_2
-        features[SIDE_3, c] = side_3
-        features[SIDE_4, c] = side_4
-        features[ROW, c] = row_mean
-        features[SCALED, c] = scaled
-        size_1 = one[c] + weights[SIDE_1] * side_1 + weights[SIDE_2] * side_2
-        size_1 += weights[SIDE_3] * side_3 + weights[SIDE_4] * side_4
-        size_1 += weights[ROW] * row_mean + weights[SCALED] * scaled
-        size_2 = two[c] + own[SIDE_1, c] * side_1 + own[SIDE_2, c] * side_2
-        size_2 += own[SIDE_3, c] * side_3 + own[SIDE_4, c] * side_4
-        size_2 += own[ROW, c] * row_mean + own[SCALED, c] * scaled
-        size_1 = min(max(size_1, LEAST_SIZE), MOST_SIZE)
-        size_2 = min(max(size_2, LEAST_SIZE), MOST_SIZE)
-        one[c], two[c] = size_1, size_2
-        before, above = features[BEFORE_1, c], features[PARENT, c]
-        log_2 = log_of(logs, size_2 * gain)
-        log_size = log_of(logs, 0.5 * (size_1 + size_2) * gain)
-        log_mean = min(log_of(logs, abs(mean)) // 4, 3)
-        distance = min(abs(fraction) >> 8, 7)
-        near = min(distance >> 1, 3)
-        at[0] = (C_MEAN + ((min(log_2 // 3, 11) * 4 + log_mean) * 4 + near) * 2) * N_SLOTS
-        at[1] = (C_LEVEL + (level * 16 + min(log_size // 3, 15)) * 4 + log_mean) * N_SLOTS
-        beyond = min(log_of(logs, (above + features[PARENT_NEXT, c]) * gain) // 5, 7)
-        at[2] = (
-            C_ROWS + min(log_of(logs, row_mean * gain) // 4, 7) * 64 + around + beyond
-        ) * N_SLOTS
-        local = min(log_of(logs, 0.5 * (before + features[BEFORE_2, c] + above) * gain) // 5, 5)
-        at[3] = (N_SHARED + c * N_OWN + level * 6 + local) * N_SLOTS
-        scale = min(log_size * 3 // 8, N_SCALES - 1)
-        opposite = 1 if (fraction < 0) != (fixed < 0) else 0
-        where = (
-            level,
-            (min(log_mean, 1) * 4 + near) * 8 + scale // 2,
-            N_SETS + c,
-            scale,
-            min(log_size // 4, 11) * 8 + distance,
-            96 + (log_mean * 2 + opposite) * 8 + distance,
-            160 + (level * 2 + opposite) * 4 + near,
-            1 if fraction >= 0 else 0,
-        )
-        if chooses:
-            q[c], more = choose(model, y[c], rounded, where, lam)
-            cost += more
-        error = q[c] - rounded
-        if not trial:
-            error = code_error(model, data, error, where)
-        value = rounded + error
-        if abs(value) > MAX_INDEX:  # ROWS-04
-            return FAULTY
-        q[c], means[c], values[c] = value, mean, float(value) / gain
-        miss = (float(value) - mean) / gain
-        side_4, side_3, side_2 = side_3, side_2, side_1
-        side_1 = min(0.5 * abs(miss) + 0.5 * abs(values[c]), MOST_SIZE)  # ROWS-03
-        if value == 0 and rounded == 0:
-            side_1 = 0.0
-        magnitudes[c], found[c] = side_1, min(abs(miss), MOST_SIZE)
-        total += side_1
+            forget_block(paths)
+        between = state & 1
+        where = expect(model, path, c, c - start, level, gain, total_usual, between)
+        one[c], two[c] = path[PATH_SIZE], path[PATH_SIZE + 1]
+        features[ROW, c], features[SCALED, c] = path[PATH_ROW], path[PATH_SCALED]
+        for k in range(4):
+            features[SIDE_1 + k, c] = path[PATH_SIDE + k]
+        integer = (abs(q[c]) + between) >> 1
+        error = code_error(model, data, (-integer if q[c] < 0 else integer) - where[ROUNDED], where)
+        integer = where[ROUNDED] + error
+        if abs(integer) > MAX_INDEX:  # ROWS-04
+            return 1
+        q[c] = twice_value(integer, between)
+        if dependent:
+            state = next_state(state, integer)
+        value = 0.5 * float(q[c])
+        miss = (value - path[PATH_MEAN]) / gain
+        note_magnitude(path, value / gain, miss, integer == 0 and error == 0)
+        row[c], row[width + c] = path[PATH_SIDE], value / gain
+        found[c] = min(abs(miss), MOST_SIZE)
         total_usual += usual[c]
-        spread(across, model.columns[block, c - start], miss)
-    if not trial:
-        magnitudes[n] = total / float(n)
-        learn_from_row(model, here, level, row)
-    return cost
+        spread(path, model.columns[block, c - start], miss)
+    row[n] = path[PATH_TOTAL] / float(n)
+    return 0
 
 
 def learn_from_row(model: Model, here: Floats2, level: int, row: int) -> None:
@@ -346,7 +205,7 @@ def learn_from_row(model: Model, here: Floats2, level: int, row: int) -> None:
         total += abs(values[c])
     share = 1.0 / (1.25 * total / float(n) + 1.0)
     share *= share
-    rest = model.means
+    rest = model.paths[0, 0]
     for block in range(blocks):
         first, stop = block * n // blocks, (block + 1) * n // blocks
         rest[:] = 0.0
@@ -354,17 +213,3 @@ def learn_from_row(model: Model, here: Floats2, level: int, row: int) -> None:
             rest[c - first] = values[c] - model.timely[c]
         take_in(model.columns[block], model.variances[block], rest, stop - first, share)
     learn_in_time(model, values, level, row, share)
-
-
-def choose(model: Model, y: float, rounded: int, where: Contexts, lam: float) -> tuple[int, float]:
-    """The integer next to ``y``, or 0, whose square error and bits cost least, and their cost."""
-    y = min(max(y, -2.0 * MAX_INDEX), 2.0 * MAX_INDEX)
-    low = int(np.floor(y))
-    best, least = low, 0.0
-    for k in range(3 if 1.0 < abs(y) < 2.0 else 2):
-        candidate = low + k if k < 2 else 0
-        away = y - float(candidate)
-        cost = away * away + lam * float(cost_of(model, candidate - rounded, where)) / COST_UNIT
-        if k == 0 or cost < least:
-            best, least = candidate, cost
-    return best, least

@@ -38,6 +38,12 @@ MAX_EXPONENT = 7
 N_SMALL = C_EXPONENT + (MAX_EXPONENT + 1) * MAX_EXPONENT  # behind them are those of the head
 M_FLAG, M_SIGN, N_SMALL_MIXERS = 0, N_LEVELS, 2 * N_LEVELS
 
+# A path through a row, behind the means of a block: magnitudes of four channels, their sum; of a
+# channel its mean, two sizes, two features; the cost to an encoder.
+N_STATES = 8  # of dependent quantization
+PATH_SIDE, PATH_TOTAL, PATH_MEAN, PATH_SIZE = BLOCK, BLOCK + 4, BLOCK + 5, BLOCK + 6
+PATH_ROW, PATH_SCALED, PATH_COST, N_PATH = BLOCK + 8, BLOCK + 9, BLOCK + 10, BLOCK + 11
+
 
 class Model(NamedTuple):
     """All that is known; ``wide`` is the number of channels rounded up to ``LANES``, one to spare.
@@ -47,8 +53,9 @@ class Model(NamedTuple):
     ``second`` (scales, slots, 33). ``at`` and ``inputs`` are what is thought of one decision.
     ``columns`` (blocks, 64, 64), ``variances`` (blocks, 64) and ``seen``, how many rows they know,
     are the prediction across channels, ``taps`` (2 levels, 5) and ``tap_energy`` that in time;
-    ``level_weights`` (levels, 16) and ``own_weights`` (16, wide) predict magnitudes. The others are
-    tables and room to work in.
+    ``level_weights`` (levels, 16) and ``own_weights`` (16, wide) predict magnitudes.
+    ``paths`` (2, states, ``N_PATH``) are those before and after a channel, ``ways`` (n, states, 3)
+    lead to them in an encoder. The others are tables and room to work in.
     """
 
     coder: Ints
@@ -67,7 +74,8 @@ class Model(NamedTuple):
     columns: Floats3
     variances: Floats2
     seen: Floats
-    means: Floats
+    paths: Floats3
+    ways: Ints3
     taps: Floats2
     tap_energy: Floats2
     timely: Floats

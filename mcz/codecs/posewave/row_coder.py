@@ -86,7 +86,8 @@ class RowCoder:
 
     def __init__(self, header: Header, classes: Ints, kept: Bools, coder: Ints, where: str) -> None:
         known, channels = header.prior, np.flatnonzero(kept)
-        self.where, self.n_kept, self.refining = where, len(channels), header.refining
+        self.where, self.n_kept = where, len(channels)
+        self.refining, self.dependent = header.refining, header.dependent
         prior = None if known is None else known.of(channels)
         self.model = make_model(classes[channels], header.start, coder, prior)
         nothing = no_rows(self.n_kept)
@@ -113,7 +114,7 @@ class RowCoder:
 
     def go_on(self, n_rows: int, stream: Stream) -> None:
         """Continue a level in another stream."""
-        n_known = 2 - len(self._indices) % 2  # keeps the parity of numbers of rows
+        n_known = 2 - len(self._doubles) % 2  # keeps the parity of numbers of rows
         last, known = self._exponents[-1], self.here[-3 - n_known :]
         self.here = np.concatenate([known, new_rows(n_rows, self.n_kept)[3:]])
         self.stream = stream
@@ -123,8 +124,8 @@ class RowCoder:
     def _make_room(self, n_known: int, n_rows: int) -> None:
         """Make room for new rows, after ``n_known`` ones of the stream before."""
         self._n_known = n_known
-        self._indices = np.zeros((n_known + n_rows, self.n_kept), np.int64)
-        self._wanted, self._means = np.zeros((2, *self._indices.shape))
+        self._doubles = np.zeros((n_known + n_rows, self.n_kept), np.int64)
+        self._wanted = np.zeros(self._doubles.shape)
         self._exponents = np.zeros(n_known + n_rows, np.int64)
         self.exponents = self._exponents[n_known:]
 
@@ -142,14 +143,14 @@ class RowCoder:
         if not self.n_kept:
             if not self.stream.is_whole:  # PWAVE-20, PWAVE-30
                 raise FormatError("bytes of rows, but no channel is kept", where=self.where)
-            return self._decoded(self._n_known, len(self._indices))
-        self._run(self._n_known, len(self._indices), -1.0)
+            return self._decoded(self._n_known, len(self._doubles))
+        self._run(self._n_known, len(self._doubles), -1.0)
         if ends and not self.stream.is_whole:  # ROWS-01
             raise FormatError(
                 f"rows of kind {self.kind} do not take {len(self.stream.data)} bytes",
                 where=self.where,
             )
-        return self._decoded(self._n_known, len(self._indices))
+        return self._decoded(self._n_known, len(self._doubles))
 
     def _run(self, first: int, stop: int, rate_weight: float) -> None:
         if not self.n_kept:
@@ -157,9 +158,8 @@ class RowCoder:
         fault = _model().code_rows(
             self.model,
             self.stream.data,
-            self._indices,
+            self._doubles,
             self._wanted,
-            self._means,
             self.here,
             *self.before,
             self.kind,
@@ -168,6 +168,7 @@ class RowCoder:
             rate_weight,
             self._exponents,
             1 if self.refining else 0,
+            1 if self.dependent else 0,
         )
         if fault >= 0:
             raise FormatError(
@@ -175,4 +176,4 @@ class RowCoder:
             )
 
     def _decoded(self, first: int, stop: int) -> Floats:
-        return self._indices[first:stop].astype(np.float64)
+        return np.multiply(self._doubles[first:stop], 0.5, dtype=np.float64)

@@ -23,6 +23,7 @@ export const version = 1;
 const REFINING = 1;
 const WHOLE_TURNS = 2;
 const VECTORS = 4;
+const DEPENDENT = 8;
 
 const MAX_LEVELS = 8;
 const MAX_SHELL = 16;
@@ -76,9 +77,10 @@ function readHeader(bytes, skeleton, groups) {
   const levels = upTo(reader, MAX_LEVELS, "levels");
   const borrowing = upTo(reader, levels, "borrowed levels");
   const [start, prior] = readStart(reader, channels.length);
-  const flags = upTo(reader, REFINING | WHOLE_TURNS | VECTORS, "as flags");
+  const flags = upTo(reader, REFINING | WHOLE_TURNS | VECTORS | DEPENDENT, "as flags");
   const refining = (flags & REFINING) !== 0;
   const whole = (flags & WHOLE_TURNS) !== 0;
+  const dependent = (flags & DEPENDENT) !== 0;
   const step = reader.f32();
   if (!(step >= 1 / GREATEST_LENGTH && step <= GREATEST_LENGTH)) reader.refuse(`a step of ${step}`);
   const radius = reader.f32();
@@ -105,7 +107,7 @@ function readHeader(bytes, skeleton, groups) {
   const firstStep = greatest.map((x) => x * 2 ** -first);
   const constantStep = firstStep.map((x) => x * 2 ** -constant);
   return {
-    ...{ levels, borrowing, start, prior, refining, whole },
+    ...{ levels, borrowing, start, prior, refining, whole, dependent },
     ...{ step, radius, kappa, spread, weights, orders },
     axisOrders: new AxisOrders(skeleton, orders),
     ...{ kinds, greatest, firstStep, constantStep, exactGroups },

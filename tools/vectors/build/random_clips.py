@@ -16,6 +16,7 @@ import numpy as np
 from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import SCALED
+from mcz.codecs.posewave.header import DEPENDENT
 from mcz.codecs.transforms.wavelets import Wavelet
 from mcz.model.motion import Motion, Signal
 from mcz.model.numbers import Grid, GridKind
@@ -277,6 +278,7 @@ def _poses(chance: Chance, name: str) -> Clip:
         "levels": levels,
         "borrowing": chance.randrange(levels + 1),
         "start": chance.randrange(2),
+        "flags": chance.choice((0, DEPENDENT)),
         "step": 2.0 ** chance.randrange(-8, 3),
         "radius": chance.choice((0.0, 0.25, 3.0, 40.0)),
         "shell": chance.randrange(17),
