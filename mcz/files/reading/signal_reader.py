@@ -82,8 +82,10 @@ class SignalReader:
     def signal(self, start: int, stop: int) -> Signal:
         """The same of all groups as a Signal, decoded once."""
         info = self.info
-        binary = not info.is_integer and any(not grid.is_text for grid in info.grids)
-        keep = binary and info.codec.domain == "ordinals" and not self.container.salvage
+        has_notes = any(info.rows[i].header.flags & GROUP_NOTES for i in info.covering(start, stop))
+        may_be_binary = has_notes or not all(grid.is_text for grid in info.grids)
+        of_ordinals = info.codec.domain == "ordinals" and not info.is_integer
+        keep = may_be_binary and of_ordinals and not self.container.salvage
         ordinals = np.empty(self._shape(start, stop), np.int64) if keep else None
         values, mask = self._read(start, stop, ordinals)
         exceptions, changes = self.exceptions(start, stop)
@@ -142,9 +144,7 @@ class SignalReader:
 
         def block(ends: tuple[int, int]) -> Block:
             a, b = ends
-            own = None
-            if out is not None and not self.info.is_integer:
-                own = out[self._rows(start, a, b)]
+            own = None if out is None or self.info.is_integer else out[self._rows(start, a, b)]
             with timing(name, math.prod(self._shape(a, b))):
                 coded = self._decode(spans, a, b)
                 return Block(a, b, coded, *self._finish(coded, a, b, own))
