@@ -233,7 +233,7 @@ function follows(kind) {
 function checkSpans(pieces) {
   const nOfFile = countFilePieces(pieces);
   for (const { kind } of pieces.slice(nOfFile)) {
-    if (follows(kind) || kind === PART) throw new Refused(`arrays: a piece of kind ${kind} in contents`);
+    if (follows(kind)) throw new Refused(`arrays: a piece of kind ${kind} in contents`);
   }
   const sums = [0]; // CRC pieces before each piece
   for (const { kind } of pieces) sums.push(sums[sums.length - 1] + (kind === CRC ? 1 : 0));

@@ -14,7 +14,7 @@ from mcz.model.schema import parse, varint
 from mcz.sources import FORMATS
 from mcz.sources.tables.layout import SectionFields, TableDetail, TableTemplate
 from mcz.sources.text import amc, asf
-from mcz.sources.text.layout import Detail
+from mcz.sources.text.layout import Detail, PatternFields
 from tools.records import build_record
 from tools.vectors.build.array_files import floats, npy, plain_npz, take_arrays
 from tools.vectors.build.c3d_files import c3d_file, c3d_outputs, take_c3d
@@ -45,9 +45,9 @@ def array() -> Motion:
     return take_arrays(npy(floats(4, 2)), "plain.npy")
 
 
-def long_array() -> Motion:
-    """An NPY file of 256 rows."""
-    return take_arrays(npy(np.ones((256, 1), np.int8)), "long.npy")
+def long_array(n_rows: int = 256) -> Motion:
+    """An NPY file of so many rows."""
+    return take_arrays(npy(np.ones((n_rows, 1), np.int8)), "long.npy")
 
 
 def two_arrays() -> Motion:
@@ -79,13 +79,14 @@ def acclaim_example() -> Motion:
 
 
 def many_sections(more: int) -> Motion:
-    """The table of sections with so many more, of signals that say nothing."""
+    """The table of sections with so many more, whose rows print nothing."""
     plain = table("sections.csv")
     assert plain.source is not None
     fields = parse(TableTemplate, plain.source.template, "template")
     own = parse(TableDetail, plain.source.detail, "detail")
     first = fields.sections[0]
-    blank = [replace(first, header=b"", patterns=[], gaps=[], signals=[3 + k]) for k in range(more)]
+    nothing = replace(first, header=b"", gaps=[b""], patterns=[PatternFields(runs=[], tail=0)])
+    blank = [replace(nothing, signals=[3 + k]) for k in range(more)]
     usual = {"count": b"", "rows": 0, "gaps": [], "patterns": [], "ends": 0, "ending": b""}
     every = [
         build_record(SectionFields, section, "section") for section in [*fields.sections, *blank]

@@ -49,7 +49,6 @@ _OF_SPAN = (*OF_PIECES, Kind.PART)
 INTEGERS = (Kind.ROWS, Kind.ITEMS)
 _OF_ROWS = (Kind.COUNT, Kind.DATA, *INTEGERS)
 _OF_DETAIL = (Kind.OWN, Kind.DEFLATE)
-_OF_CONTENTS = (Kind.TEXT, Kind.OWN, *_OF_ROWS)
 
 
 def _if(kinds: Sequence[Kind], item: object) -> IfThenElse:
@@ -91,10 +90,10 @@ class ArrayPiece(Record):
     )
     start: int | None = field(
         _if(_OF_START, UVARINT),
-        "CRC, SIZE and DEFLATE: first piece; PART: first frame number; ITEMS: factor",
+        "references: the first piece; PART: first frame number; ITEMS: factor",
     )
     stop: int | None = field(
-        _if(_OF_SPAN, UVARINT), "CRC, SIZE, DEFLATE and PART only: after the last of these"
+        _if(_OF_SPAN, UVARINT), "references and PART only: after the last of these"
     )
 
 
@@ -214,7 +213,7 @@ def check_spans(pieces: Sequence[Piece]) -> None:
     """Raise FormatError where pieces refer to others that do not exist, or to themselves."""
     n_file = n_file_pieces(pieces)
     for index, piece in enumerate(pieces[n_file:], n_file):
-        if piece.kind not in _OF_CONTENTS:  # ARRAY-18
+        if piece.kind in OF_PIECES:  # ARRAY-18
             raise FormatError(f"source template: piece {index} of kind {piece.kind} in contents")
     spans = set()
     checks = [0, *accumulate(piece.kind == Kind.CRC for piece in pieces)]
