@@ -159,7 +159,7 @@ def test_a_plain_trc_holds_markers_alone() -> None:
     again = back("trc", FORMATS["trc"].write(markers))
     assert np.array_equal(again.values, markers.values, equal_nan=True)
     assert again.skeleton.joint_names == markers.skeleton.joint_names
-    with pytest.raises(MotionError, match="markers alone"):
+    with pytest.raises(MotionError, match="markers only"):
         FORMATS["trc"].write(replace(bvh_walk(), source=None))
     unknown = replace(markers, skeleton=replace(markers.skeleton, unit_cm=None))
     with pytest.raises(MotionError, match="length unit"):
