@@ -109,17 +109,16 @@ ANSWERS = {
     ),
     "posewave": KnownAnswer(
         0, "all",
-        "0301000c8fc2753d00004040488b94020a0000000000",
+        "0201000c8fc2753d00004040488b94020a0000000000",
         (
             (
-                "00ff7775fad91521af7bf10ccbf249e45784dee25736fbe06498ecfd435c8ea1064bb6c1c629"
-                "62e771e6829e"
+                "00ff74ea5cbed9593a437e249c483e0d9d5bb5adaff5478e65552a67d8a5bd1b2d7cb42021af"
+                "0b1fc885bad36b10372400da9b822e3f1f2353d270138ce7fa25c2a35bc32d8885"
             ),
-            "0a374bdff9f52538e2dea2783104d69dc9d8d5034ec51f0c0fb42166",
-            "900ce004821bed8f926274d4793652627016df29da55ec0c0bcccc52",
-            "19c6581004ea0134283c79479e32ebd4e13cb6",
+            "98b83fd29fd367a47ddd273e2d851863570883b8383d3d387ae4",
+            "11cc09d56380ccaf28f7120f673e556738b8",
         ),
-        "f15bba14243eb9e0c96bfeeb9815af81597ef3cfaa638256cf2d819535c9d7a4",
+        "85c38b8d62e243fc877a2a69fac81e85c8d531a05d32b545cc07670f48b71cdf",
     ),
     "mrdwt": KnownAnswer(
         0, "channel",

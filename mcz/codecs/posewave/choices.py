@@ -63,6 +63,7 @@ GREATEST_DEGREES = 4.8  # fine steps beyond which the metric is meaningless
 GREATEST_FROM_CM = 0.03  # from this step on they are coarser
 SHELL = 8  # sixteenths
 DEPENDENT_STEP = 1.2  # steps of dependent quantization that err as a plain one does
+DEPENDENT_PRICE = 0.8  # of a bit, in its squared steps, beside that of plain quantization
 FINE_SPREAD, COARSE_SPREAD = 2, 3  # octaves above 2^-10
 COARSE_CM = 0.065  # from this step on the second start table is nearer
 SHARE_OF_CONSTANT = 0.25  # of a step: greatest effect of a constant channel on points
@@ -72,6 +73,7 @@ FINE_CM = 0.08  # below this step first poses are coded more precisely
 SPATIAL = (*ROTATION_KINDS, *POSITION_KINDS)
 LEVELS = ((0.06, (2, 3, 4, 5)), (0.2, (3, 4, 5, 6)), (math.inf, (4, 5, 6, 7)))  # tried below a step
 TRIAL_FRAMES = 2048
+PLAIN_TRIALS_CM = 0.2  # steps below which levels are tried with plain quantization
 SAMPLE_DISTANCE = 8  # frames between measured ones in a trial
 EXCHANGE = 0.75  # fall of bytes per rise of errors, in logarithms, for comparing trials
 STEPS_CM = 0.01, 0.045  # between these steps the weight of a bit goes from the first to the second
@@ -80,7 +82,7 @@ USUAL = (  # steps, mean errors
     (0.0055, 0.03, 0.065, 0.14, 0.28, 0.56, 1.1, 2.2),
     (0.01, 0.046, 0.079, 0.13, 0.205, 0.32, 0.55, 0.9),
 )
-MEAN_TO_BOUND = 0.22  # the mean error with which a bound takes the fewest bytes
+MEAN_TO_BOUND = 0.195  # the mean error with which a bound takes few bytes and trials
 STEP_OF_BOUND = 0.2  # live, where rows of frames that are farther off get finer ones
 COARSEST_WEIGHT = 0.096  # of a bit at level 0, whose errors affect later rows
 
@@ -310,11 +312,15 @@ def best_levels(
     orders = Orders(joint_codes(fields["flags"], fields["orders"], skeleton), skeleton)
     coded = orders.to_coded_order(values)
     no_notes = np.zeros((-(-n_frames // SAMPLE_DISTANCE), len(orders.places), N_NOTES), np.int64)
+    if step_cm < PLAIN_TRIALS_CM:  # plain quantization ranks levels alike, in half the time
+        plain = {"flags": fields["flags"] & ~DEPENDENT, "step": fields["step"] / DEPENDENT_STEP}
+        fields = {**fields, **plain}
+        price = DEPENDENT_PRICE
+        weights = Weights(weights.approximations / price, weights.details / price)
 
     def score(levels: int) -> float:
-        header = parse_posewave_header(
-            build_header(**{**fields, "levels": levels, "borrowing": min(1, levels)}), layout
-        )
+        own = {"levels": levels, "borrowing": min(1, levels)}
+        header = parse_posewave_header(build_header(**{**fields, **own}), layout)
         streams, decoded = encode_coded(header, skeleton, coded, weights)
         decoded = orders.values(decoded[::SAMPLE_DISTANCE], no_notes)
         decoded[:, header.exact] = values[::SAMPLE_DISTANCE, header.exact]

@@ -186,7 +186,7 @@ def meet_bound(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, d
     step = min(max(guessed or _first_step(dial, target, trial), dial.low), dial.high)
     for _ in range(MOST_STEPS):
         octaves: NDArray[np.int64] = np.zeros(trial.motion.n_frames, np.int64)
-        for _ in range(MOST_ROUNDS):
+        for width in range(1, MOST_ROUNDS + 1):
             params = {dial.parameter: step, REFINEMENT: octaves}
             try:
                 errors = trial.frame_errors(target, params)
@@ -196,7 +196,7 @@ def meet_bound(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, d
             if not (errors > target.limit).any():
                 reached = float(errors.max(initial=0.0))
                 return params, {"target_reached": repr(reached)}
-            octaves = _refine(octaves, errors / target.limit)
+            octaves = _refine(octaves, errors / target.limit, width)
         missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
         step = max(step * FINER, dial.low)
     raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
@@ -240,13 +240,17 @@ def meet_mean(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, di
     return {dial.parameter: 2.0 ** (met / 4)}, {"target_reached": repr(reached)}
 
 
-def _refine(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
-    """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and next to it."""
+def _refine(octaves: NDArray[np.int64], ratios: Floats, width: int) -> NDArray[np.int64]:
+    """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and near it.
+
+    Frames up to ``width`` away get them, too: those that still miss after several rounds move
+    their neighbors, which then miss in turn.
+    """
     with np.errstate(divide="ignore"):
         missing = np.where(ratios > 1, np.ceil(np.log2(ratios) + MARGIN), 0.0).astype(np.int64)
-    padded = np.pad(missing, 1)
-    added = np.maximum(missing, np.maximum(padded[:-2], padded[2:]))
-    return np.minimum(octaves + added, MOST_OCTAVES)
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(missing, width), 2 * width + 1)
+    finer: NDArray[np.int64] = np.minimum(octaves + windows.max(axis=1, initial=0), MOST_OCTAVES)
+    return finer
 
 
 def weigh_joints(
