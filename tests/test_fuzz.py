@@ -116,6 +116,12 @@ def test_a_mutation_is_that_of_its_seed() -> None:
     assert len(STEPS) == len(WEIGHTS)
 
 
+# Seeds that may be refused: damaged ones, and texts of vectors that no source file has.
+HARMLESS = (
+    "invalid uncommon long arrays- table-marks table-no-rows table-odd table-sections".split()
+)
+
+
 @pytest.mark.parametrize("name", TARGETS)
 def test_seeds_pass(name: str) -> None:
     target = TARGETS[name]
@@ -127,8 +133,7 @@ def test_seeds_pass(name: str) -> None:
             if decoded == amount(6, 2):
                 break
         except mcz.MczError:
-            harmless = "invalid", "uncommon", "long", "table-odd", "arrays-", "sections-numbers"
-            assert any(word in key for word in harmless)
+            assert any(word in key for word in HARMLESS)
     assert decoded > 0
 
 

@@ -288,8 +288,8 @@ def test_plain_files_of_any_size_are_read_by_others(
 @pytest.mark.parametrize(
     ("joint", "message"),
     [
-        (Joint("hips", channels=(*POSITION, Channel("rx"))), "'hips' is none"),
-        (Joint("hips", channels=POSITION[:2]), "'hips' is none"),
+        (Joint("hips", channels=(*POSITION, Channel("rx"))), "'hips' is not a marker"),
+        (Joint("hips", channels=POSITION[:2]), "'hips' is not a marker"),
         (Joint("x" * 256, channels=POSITION), "256 bytes"),
     ],
 )
