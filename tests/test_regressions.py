@@ -203,7 +203,7 @@ def test_salvage_gives_up_where_everything_looks_like_a_chunk() -> None:
     false += bytes(16)
     with mcz.open(bytes(data) + b"\0" + false, salvage=True) as file:
         assert list(file.clips) == ["smooth"]
-        assert "looks like a chunk" in file.damage[-1]
+        assert "false starts of a chunk" in file.damage[-1]
 
 
 def test_equal_numbers_are_printed_once() -> None:
