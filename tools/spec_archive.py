@@ -12,15 +12,12 @@ from __future__ import annotations
 import argparse
 import hashlib
 import subprocess
-import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from mcz.version import VERSION  # noqa: E402
-
+VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
 PATHS = "SPEC.md LICENSE CHANGELOG.md mcz/annex conformance tools/js tools/c".split()
 BEFORE_ALL = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can state
 README = """\

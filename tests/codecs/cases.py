@@ -83,7 +83,7 @@ CASES = {
     "online-golomb": Case("online", 1, POINT | {"gof": 5, "coder": "golomb", "basis": "cosines"}),
     "online-reordered": Case("online", 1, POINT | {"gof": 5, "order": "reordered"}),
     "online-rate": Case("online", np.inf, {"preset": "rc", "bitrate": 20.0}),
-    "posewave": Case("posewave", 8, {"step": 0.1, "levels": 2}),
+    "posewave": Case("posewave", 6, {"step": 0.1, "levels": 2}),
     "posewave-fine": Case("posewave", 3, {"step": 0.05, "levels": 0}),
 }
 

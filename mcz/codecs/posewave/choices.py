@@ -314,8 +314,7 @@ def best_levels(
     no_notes = np.zeros((-(-n_frames // SAMPLE_DISTANCE), len(orders.places), N_NOTES), np.int64)
     if step_cm < PLAIN_TRIALS_CM:  # plain quantization ranks levels alike, in half the time
         plain = {"flags": fields["flags"] & ~DEPENDENT, "step": fields["step"] / DEPENDENT_STEP}
-        fields = {**fields, **plain}
-        price = DEPENDENT_PRICE
+        fields, price = {**fields, **plain}, DEPENDENT_PRICE
         weights = Weights(weights.approximations / price, weights.details / price)
 
     def score(levels: int) -> float:

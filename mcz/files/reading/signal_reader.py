@@ -82,13 +82,12 @@ class SignalReader:
     def signal(self, start: int, stop: int) -> Signal:
         """The same of all groups as a Signal, decoded once."""
         info = self.info
-        has_notes = any(info.rows[i].header.flags & GROUP_NOTES for i in info.covering(start, stop))
-        may_be_binary = has_notes or not all(grid.is_text for grid in info.grids)
-        of_ordinals = info.codec.domain == "ordinals" and not info.is_integer
-        keep = may_be_binary and of_ordinals and not self.container.salvage
+        exceptions, changes = self.exceptions(start, stop)
+        grids = (*info.grids, *(grid for _, _, grid in changes))
+        binary = not info.is_integer and any(not grid.is_text for grid in grids)
+        keep = binary and info.codec.domain == "ordinals" and not self.container.salvage
         ordinals = np.empty(self._shape(start, stop), np.int64) if keep else None
         values, mask = self._read(start, stop, ordinals)
-        exceptions, changes = self.exceptions(start, stop)
         per_frame = info.layout.samples_per_frame
         signal = Signal(values, info.grids, info.name, per_frame, mask, exceptions, changes)
         return replace(
