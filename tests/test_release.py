@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import mcz
+from tools import make_vectors
 
 ROOT = Path(__file__).parents[1]
 REGISTRATIONS = ROOT / "conformance" / "registrations" / "README.md"
@@ -47,6 +48,32 @@ def test_placeholders_are_listed(placeholder: str) -> None:
     own = {"tests/test_release.py", REGISTRATIONS.relative_to(ROOT).as_posix()}
     listed = set(re.findall(r"`([^`]+)`", row)) - {placeholder}
     assert listed == set(found.stdout.split()) - own
+
+
+def test_list_of_frozen_vectors() -> None:
+    """SPEC.md states the hash of the list, and the list those of all vectors."""
+    folder = ROOT / "conformance"
+    sums = (folder / "SHA256SUMS").read_bytes()
+    assert f"`{hashlib.sha256(sums).hexdigest()}`" in (ROOT / "SPEC.md").read_text("utf-8")
+    assert make_vectors.listed_hashes(sums.decode("ascii")) == {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.glob("vectors/**/*.mcz")
+    }
+
+
+def test_no_frozen_vector_changes_or_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From 1.0 on, vectors are only added."""
+    listed = {"vectors/a.mcz": "0" * 64, "vectors/b.mcz": "1" * 64}
+    added = "".join(f"{digest}  {path}\n" for path, digest in listed.items())
+    assert make_vectors.changes_of_frozen(listed, added + f"{'2' * 64}  vectors/c.mcz\n") == []
+    altered = added.replace("1" * 64, "3" * 64)
+    assert make_vectors.changes_of_frozen(listed, altered) == ["vectors/b.mcz"]
+    assert make_vectors.changes_of_frozen(listed, "") == ["vectors/a.mcz", "vectors/b.mcz"]
+
+    monkeypatch.setattr(make_vectors, "FORMAT", (1, 0))
+    monkeypatch.setattr(make_vectors, "files", lambda: {make_vectors.SUMS: b""})
+    with pytest.raises(SystemExit, match="frozen files would change: vectors/"):
+        make_vectors.main([])
 
 
 def test_archive_of_the_specification(tmp_path: Path) -> None:

@@ -1,10 +1,11 @@
-"""Write conformance/vectors and conformance/manifest.json; nothing else ever does.
+"""Write conformance/vectors, their manifest and SHA256SUMS; nothing else ever does.
 
     python tools/make_vectors.py [--check] [TABLE ...]
 
 The same code and the same zlib give the same bytes: there are no clocks and no dice. ``--check``
 writes nothing and says whether all files are as they would be written. Vectors of a released
-format are frozen (SPEC.md, "Versions").
+format are frozen (SPEC.md, "Versions"): from 1.0 on this program refuses to change or remove a
+file that SHA256SUMS lists.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ import hashlib
 import json
 import sys
 import zlib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
-from mcz.container.limits import FORMAT_NAME  # noqa: E402 - needs the path
+from mcz.container.limits import FORMAT, FORMAT_NAME  # noqa: E402 - needs the path
 from tools.vectors import uncommon, valid  # noqa: E402 - needs the path
 from tools.vectors.bases import MADE  # noqa: E402
 from tools.vectors.build.files import OK, REFUSED, Vector  # noqa: E402
@@ -31,6 +32,7 @@ from tools.vectors.engine.tables import rows as table_rows  # noqa: E402
 from tools.vectors.requirements import requirements  # noqa: E402
 
 CONFORMANCE = ROOT / "conformance"
+SUMS = "SHA256SUMS"
 GROUPS = {"valid": valid.MODULES, "uncommon": uncommon.MODULES, "invalid": ()}
 
 
@@ -119,9 +121,9 @@ def _hash(data: bytes) -> str:
 def files() -> dict[str, bytes]:
     """Path below conformance/ and content of every file."""
     made = vectors()
-    return {f"vectors/{vector.name}.mcz": vector.data for vector in made} | {
-        "manifest.json": _manifest(rows(made)).encode()
-    }
+    written = {f"vectors/{vector.name}.mcz": vector.data for vector in made}
+    manifest = _manifest(rows(made)).encode()
+    return written | {"manifest.json": manifest, SUMS: _sums(_hashes(written))}
 
 
 def files_of(names: Collection[str]) -> dict[str, bytes]:
@@ -137,9 +139,29 @@ def files_of(names: Collection[str]) -> dict[str, bytes]:
     groups = list(GROUPS)
     whole = [*kept, *rows(made, every)]
     whole.sort(key=lambda fields: (groups.index(fields["group"]), fields["file"][:-4]))
-    return {f"vectors/{vector.name}.mcz": vector.data for vector in made} | {
-        "manifest.json": _manifest(whole).encode()
-    }
+    written = {f"vectors/{vector.name}.mcz": vector.data for vector in made}
+    hashes = listed_hashes((CONFORMANCE / SUMS).read_text("ascii")) | _hashes(written)
+    return written | {"manifest.json": _manifest(whole).encode(), SUMS: _sums(hashes)}
+
+
+def listed_hashes(sums: str) -> dict[str, str]:
+    """Path below conformance/ and SHA-256 of every file that ``sums`` lists."""
+    return {path: digest for digest, path in (line.split("  ") for line in sums.splitlines())}
+
+
+def changes_of_frozen(listed: Mapping[str, str], sums: str) -> list[str]:
+    """Paths of ``listed`` that ``sums`` leaves out or gives another SHA-256."""
+    now = listed_hashes(sums)
+    return sorted(path for path, digest in listed.items() if now.get(path) != digest)
+
+
+def _hashes(written: Mapping[str, bytes]) -> dict[str, str]:
+    return {path: _hash(data) for path, data in written.items()}
+
+
+def _sums(hashes: Mapping[str, str]) -> bytes:
+    """A line a file, as ``sha256sum --check`` reads it."""
+    return "".join(f"{hashes[path]}  {path}\n" for path in sorted(hashes)).encode("ascii")
 
 
 def _manifest(listed: Sequence[dict[str, Any]]) -> str:
@@ -169,13 +191,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(name)
     if options.check:
         return int(bool(stale or changed))
+    if FORMAT >= (1, 0):
+        listed = listed_hashes((CONFORMANCE / SUMS).read_text("ascii"))
+        if frozen := changes_of_frozen(listed, made[SUMS].decode("ascii")):
+            raise SystemExit(f"make_vectors: frozen files would change: {', '.join(frozen)}")
     for name in stale:
         (CONFORMANCE / name).unlink()
     for name in changed:
         (CONFORMANCE / name).parent.mkdir(parents=True, exist_ok=True)
         (CONFORMANCE / name).write_bytes(made[name])
     size = sum(map(len, made.values()))
-    print(f"{len(made) - 1} vectors, {size:,} bytes with the manifest")
+    print(f"{len(made) - 2} vectors, {size:,} bytes with the manifest and {SUMS}")
+    print(f"SHA-256 of {SUMS}, which SPEC.md states: {_hash(made[SUMS])}")
     return 0
 
 
