@@ -1,4 +1,4 @@
-"""Write what a program makes of SPEC.md, or check it: field tables, contents, a traced stream.
+"""Write what a program makes of SPEC.md, or check it: field tables, contents, traced streams.
 
     python tools/spec_tables.py [--check]
 
@@ -6,7 +6,7 @@ A table follows a line ``<!-- table: NAME -->``; NAME is that of a record, ``Joi
 ``Joint`` being JOINT, or of a tuple of (name, type, meaning) rows that a loop reads by, in one of
 ``MODULES``. Structures that are read
 by hand have tables without such a line. The contents list the headings behind them.
-The lines of the traced stream are those of ``tools/spec_trace.py``.
+The lines of traced streams are those of ``tools/spec_trace.py`` and ``tools/spec_trace_fast.py``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from mcz.model import numbers, schema
 from mcz.model.schema import types
 from mcz.model.schema.columns import Columns
 from mcz.model.schema.records import RecordType
-from tools import spec_trace
+from tools import spec_trace, spec_trace_fast
 
 MODULES = (
     "mcz.container.payloads",
@@ -70,7 +70,8 @@ NUMBERS = {"B": "u8", "L": "u32", "Q": "u64", "f": "binary32", "d": "binary64"}
 SPEC = Path(__file__).parent.parent / "SPEC.md"
 MARK = re.compile(r"(<!-- table: (\S+) -->\n)((?:\|.*\n)*)")
 CONTENTS = re.compile(r"(<!-- contents -->\n)(.*?)(<!-- end of contents -->\n)(.*)", re.DOTALL)
-TRACE = re.compile(r"(<!-- trace -->\n```\n).*?(```\n)", re.DOTALL)
+TRACE = re.compile(r"(<!-- trace (\w+) -->\n```\n).*?(```\n)", re.DOTALL)
+TRACES = {"best": spec_trace.trace_bits, "fast": spec_trace_fast.trace}
 HEADING = re.compile(r"^(##?) (.+)$", re.MULTILINE)
 
 
@@ -175,10 +176,10 @@ def anchor(heading: str) -> str:
 
 
 def generate(text: str) -> str:
-    """``text`` with every marked table, the traced stream and the contents made anew."""
+    """``text`` with every marked table, the traced streams and the contents made anew."""
     known = structures()
     text = MARK.sub(lambda match: match[1] + table(known[match[2]]), text)
-    text = TRACE.sub(lambda match: match[1] + spec_trace.trace_bits() + match[2], text)
+    text = TRACE.sub(lambda match: match[1] + TRACES[match[2]]() + match[3], text)
     return CONTENTS.sub(lambda match: f"{match[1]}{contents(match[4])}{match[3]}{match[4]}", text)
 
 
@@ -187,7 +188,7 @@ def main() -> int:
     fresh = generate(text)
     if "--check" in sys.argv[1:]:
         if fresh != text:
-            print("SPEC.md: a table, the contents or the trace is old; run tools/spec_tables.py")
+            print("SPEC.md: a table, the contents or a trace is old; run tools/spec_tables.py")
         return int(fresh != text)
     SPEC.write_text(fresh)
     return 0
