@@ -3,6 +3,10 @@
 #include <math.h>
 #include <string.h>
 
+/* Whether slices of arrays are counted. Functions that allocate nothing hide it by a variable of
+   theirs, see translating.py; the other name is what Cython calls that. */
+enum { __pyx_v_mcz_counts = 1 };
+
 /* Rounded down, and 0 by a divisor of 0; by -1 without the one quotient that traps. */
 static inline long long mcz_divide(long long a, long long b) {
   if (b == 0) return 0;

@@ -241,6 +241,8 @@ class Unit:
     def _function(self, name: str) -> str:
         function = self.functions[name]
         declared = function.declarations(self.written[name])
+        if not function.effects.allocates:  # its slices are of arrays that its callers hold
+            declared.append("    cdef bint mcz_counts = False")
         return "\n".join([f"{self._signature(function)}:", *declared, *function.lines, ""])
 
     def _door(self, where: Source, name: str) -> str:
