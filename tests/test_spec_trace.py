@@ -2,45 +2,70 @@
 
 from __future__ import annotations
 
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mcz.codecs.contract import Codec, Layout, Request, Span
 from mcz.codecs.lossless import best, fast
+from mcz.codecs.posewave.model import start_tables
+from mcz.codecs.posewave.row_coder import RowCoder, Stream, fresh_coder
 from mcz.model.numbers import Grid, GridKind
 from tests.test_spec import SPEC
-from tools import spec_trace, spec_trace_fast
+from tools.spec_traces import best as trace_of_best
+from tools.spec_traces import fast as trace_of_fast
+from tools.spec_traces import posewave
 
 LINES = SPEC.split("<!-- trace best -->\n```\n")[1].split("```")[0].splitlines()
 
 
 def test_ordinals_are_those_that_the_text_says() -> None:
-    leads = [tuple(step.lead for step in steps) for steps in spec_trace.rows()]
-    assert leads == list(spec_trace.ORDINALS[1:])
+    leads = [tuple(step.lead for step in steps) for steps in trace_of_best.rows()]
+    assert leads == list(trace_of_best.ORDINALS[1:])
     said = " ".join(SPEC.split("## A traced stream\n")[1].split("<!--")[0].split())
-    assert ", ".join(f"{one} {two}" for one, two in spec_trace.ORDINALS) + ". The" in said
-    assert f"The stream is ``` {spec_trace.STREAM.hex(' ').upper()} ```" in said
+    assert ", ".join(f"{one} {two}" for one, two in trace_of_best.ORDINALS) + ". The" in said
+    assert f"The stream is ``` {trace_of_best.STREAM.hex(' ').upper()} ```" in said
 
 
 def test_lines_of_the_text_are_those_of_the_decoder() -> None:
-    assert "\n".join([*LINES, ""]) == spec_trace.trace_bits()
+    assert "\n".join([*LINES, ""]) == trace_of_best.trace_bits()
     bits = [line.split() for line in LINES if line[:3].strip().isdigit()]
     assert len(bits) >= 10
     assert [int(bit[0]) for bit in bits] == list(range(1, len(bits) + 1))
 
 
 def test_traced_stream_of_fast() -> None:
-    ordinals = [tuple(row) for row, _ in spec_trace_fast.rows()]
-    assert ordinals == list(spec_trace_fast.ORDINALS)
+    ordinals = [tuple(row) for row, _ in trace_of_fast.rows()]
+    assert ordinals == list(trace_of_fast.ORDINALS)
     section = SPEC.split("### A traced stream of fast\n")[1]
-    assert f"```\n{spec_trace_fast.STREAM.hex(' ').upper()}\n```" in section
-    assert f"<!-- trace fast -->\n```\n{spec_trace_fast.trace()}```" in section
+    assert f"```\n{trace_of_fast.STREAM.hex(' ').upper()}\n```" in section
+    assert f"<!-- trace fast -->\n```\n{trace_of_fast.trace()}```" in section
+
+
+def test_traced_row_of_posewave() -> None:
+    decoded = [tuple(tuple(row) for row in doubles) for doubles, _ in posewave.levels()]
+    assert tuple(decoded) == posewave.DOUBLES
+    section = SPEC.split("### A traced row\n")[1]
+    streams = "".join(f"{stream.hex(' ').upper()}\n" for stream in posewave.STREAMS)
+    assert f"```\n{streams}```" in section
+    assert f"<!-- trace posewave -->\n```\n{posewave.trace()}```" in section
+
+
+def test_posewave_decodes_the_same_rows() -> None:
+    start = start_tables()[0]
+    header = SimpleNamespace(prior=None, refining=False, dependent=True, start=start)
+    n = len(posewave.CLASSES)
+    coder = fresh_coder(start)
+    rows = RowCoder(header, np.array(posewave.CLASSES), np.ones(n, bool), coder, "rows")
+    for level, (kind, n_rows) in enumerate(posewave.LEVELS):
+        rows.begin(level, kind, n_rows, Stream(coder, 0, posewave.STREAMS[level]))
+        assert (rows.decode() * 2).tolist() == [list(row) for row in posewave.DOUBLES[level]]
 
 
 @pytest.mark.parametrize(
     ("codec", "trace"),
-    [(best.CODEC, spec_trace), (fast.CODEC, spec_trace_fast)],
+    [(best.CODEC, trace_of_best), (fast.CODEC, trace_of_fast)],
     ids=lambda one: one.name if isinstance(one, Codec) else "",
 )
 def test_the_package_decodes_the_same_stream(codec: Codec, trace: ModuleType) -> None:

@@ -6,7 +6,7 @@ A table follows a line ``<!-- table: NAME -->``; NAME is that of a record, ``Joi
 ``Joint`` being JOINT, or of a tuple of (name, type, meaning) rows that a loop reads by, in one of
 ``MODULES``. Structures that are read
 by hand have tables without such a line. The contents list the headings behind them.
-The lines of traced streams are those of ``tools/spec_trace.py`` and ``tools/spec_trace_fast.py``.
+The lines of traced streams are those of ``tools/spec_traces``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from mcz.model import numbers, schema
 from mcz.model.schema import types
 from mcz.model.schema.columns import Columns
 from mcz.model.schema.records import RecordType
-from tools import spec_trace, spec_trace_fast
+from tools.spec_traces import best, fast, posewave
 
 MODULES = (
     "mcz.container.payloads",
@@ -71,7 +71,7 @@ SPEC = Path(__file__).parent.parent / "SPEC.md"
 MARK = re.compile(r"(<!-- table: (\S+) -->\n)((?:\|.*\n)*)")
 CONTENTS = re.compile(r"(<!-- contents -->\n)(.*?)(<!-- end of contents -->\n)(.*)", re.DOTALL)
 TRACE = re.compile(r"(<!-- trace (\w+) -->\n```\n).*?(```\n)", re.DOTALL)
-TRACES = {"best": spec_trace.trace_bits, "fast": spec_trace_fast.trace}
+TRACES = {"best": best.trace_bits, "fast": fast.trace, "posewave": posewave.trace}
 HEADING = re.compile(r"^(##?) (.+)$", re.MULTILINE)
 
 

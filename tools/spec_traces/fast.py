@@ -1,7 +1,6 @@
 """A stream of fast, decoded step by step: the lines of SPEC.md, "A traced stream of fast".
 
-``tools/spec_tables.py`` puts them into SPEC.md. The decoder here is SPEC.md's pseudo-code for form
-0, word for word; it shares nothing with that of the package.
+The decoder is SPEC.md's pseudo-code for form 0.
 """
 
 from __future__ import annotations

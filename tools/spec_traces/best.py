@@ -1,7 +1,6 @@
 """A stream of best, decoded step by step: the lines of SPEC.md, "A traced stream".
 
-``tools/spec_tables.py`` puts them into SPEC.md. The decoder here is SPEC.md's pseudo-code for form
-0, word for word; it shares nothing with that of the package.
+The decoder is SPEC.md's pseudo-code for form 0.
 """
 
 from __future__ import annotations
@@ -9,8 +8,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+
+from tools.spec_traces.coder import RangeDecoder, clamp, probabilities_of
 
 ORDINALS = (  # of two channels, the second of which looks at the first
     *((0, 5), (40, 30), (75, 41), (101, 67), (120, 70), (131, 77), (140, 81), (138, 90)),
@@ -20,30 +21,12 @@ STREAM = bytes.fromhex(
     "01 00 00 1d 00 0a 1e 12 e0 b7 b7 e9 79 81 56 8c f7 35 1f f0 24 0a 0d 8a 8b c7"
 )
 BITS_OF, FIGURES_OF = 1, 11  # rows that are shown: the first so many by bits, this one by figures
-START = Path(__file__).parents[1] / "conformance" / "annex" / "best_start.json"
+START = Path(__file__).parents[2] / "conformance" / "annex" / "best_start.json"
 
-NODES = [22, 36, 60, 98, 162, 267, 439, 720, 1179, 1921, 3108, 4971, 7812, 11955, 17625, 24743]
-NODES = [*NODES, 32768, *(65536 - node for node in reversed(NODES))]
 BELOW, LESS, MORE, SECOND, THIRD, SIDE = 0, 72, 152, 2072, 2232, 2552
 NAMES = {BELOW: "BELOW", LESS: "LESS", MORE: "MORE", SECOND: "SECOND", THIRD: "THIRD", SIDE: "SIDE"}
 MIXERS = {BELOW: 0, LESS: 1, MORE: 2, SECOND: 14, THIRD: 15, SIDE: 16}
 LIMIT = 2.0**20
-
-
-def clamp(v: int, a: int, b: int) -> int:
-    return min(max(v, a), b)
-
-
-def squash(x: int) -> int:
-    i, v = divmod(x + 2048, 128)
-    return (NODES[i] * (128 - v) + NODES[i + 1] * v + 64) // 128
-
-
-SQUASHED = [(x, squash(x)) for x in range(-2047, 2048)]
-
-
-def stretch(p: int) -> int:
-    return next((x for x, one in SQUASHED if one >= 16 * (p // 16) + 8), 2047)
 
 
 def quarters(v: int) -> int:
@@ -51,67 +34,22 @@ def quarters(v: int) -> int:
     return min(4 * (n - 1) + (4 * v // 2 ** (n - 1)) % 4, 111)
 
 
-@dataclass
-class Decoder:
-    """The range coder, its models and mixers, and a line for each bit that it has decoded."""
+class Decoder(RangeDecoder):
+    """Keeps a line for each mixed bit that it has decoded."""
 
-    data: bytes
-    low: int = 0
-    high: int = 2**32 - 1
-    code: int = 0
-    at: int = 0
-    lines: list[str] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
+    def __init__(self, data: bytes) -> None:
         table = json.loads(START.read_text("utf-8"))
-        self.p = [256 * byte + 128 for byte in bytes.fromhex("".join(table["probabilities"]))]
-        self.n = list(bytes.fromhex("".join(table["counts"])))
-        self.weights = table["weights"]
-        for _ in range(4):
-            self.code = self.code * 256 + self.byte()
-
-    def byte(self) -> int:
-        self.at += 1
-        return self.data[self.at - 1] if self.at <= len(self.data) else 0
-
-    def decode(self, one: int) -> tuple[int, int]:
-        """The bit, and ``middle``."""
-        w = self.high - self.low
-        middle = self.low + w // 65536 * one + w % 65536 * one // 65536
-        bit = int(self.code <= middle)
-        if bit:
-            self.high = middle
-        else:
-            self.low = middle + 1
-        while self.low >> 24 == self.high >> 24:
-            self.low = self.low * 256 % 2**32
-            self.high = self.high * 256 % 2**32 + 255
-            self.code = self.code * 256 % 2**32 + self.byte()
-        return bit, middle
-
-    def number(self, n: int) -> int:
-        value = 0
-        for _ in range(n):
-            value = 2 * value + self.decode(32768)[0]
-        return value
+        counts = list(bytes.fromhex("".join(table["counts"])))
+        super().__init__(data, probabilities_of(table["probabilities"]), counts, table["weights"])
+        self.lines: list[str] = []
 
     def mix_bit(self, kind: int, places: tuple[int, int, int], more: int = 0) -> int:
         """A bit of ``kind`` from its contexts at these places; of MORE, ``more`` mixers on."""
         contexts = [kind + place for place in places]
         mixer = MIXERS[kind] + more
         before = " ".join(f"{self.p[c]:5}" for c in contexts)
-        x = [stretch(self.p[c]) for c in contexts]
-        w = self.weights[3 * mixer : 3 * mixer + 3]
-        one = squash(clamp(sum(a * b for a, b in zip(w, x, strict=True)) >> 16, -2047, 2047))
         state = f"{self.low:08X} {self.high:08X} {self.code:08X}"
-        bit, middle = self.decode(one)
-        error = 65536 * bit - one
-        for i in range(3):
-            moved = w[i] + ((x[i] * error + 8192) >> 14)
-            self.weights[3 * mixer + i] = clamp(moved, -(2**24), 2**24)
-        for c in contexts:
-            self.p[c] += ((65535 * bit - self.p[c]) * (65536 // (self.n[c] + 2))) >> 16
-            self.n[c] = min(self.n[c] + 1, 250)
+        bit, one, middle = self.mixed(mixer, contexts)
         names = " ".join(f"{c:4}" for c in contexts)
         begin = f"{len(self.lines) + 1:3}  {NAMES[kind]:6}  {names}  {before}"
         self.lines.append(f"{begin}  {mixer:3}  {one:5}  {state}  {middle:08X}  {bit:3}")
