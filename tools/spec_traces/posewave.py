@@ -64,7 +64,7 @@ class Row:
 
 
 class Model:
-    """What "State of rows" lists."""
+    """The state that "State of rows" lists."""
 
     def __init__(self, classes: Sequence[int]) -> None:
         start = json.loads((ANNEX / "posewave_start.json").read_text("utf-8"))
