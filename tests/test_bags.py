@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.files.bags.manifests import manifest_text, read_manifest, read_tags, tags_text
+from mcz.files.bags import manifest_text, read_manifest, read_tags, tags_text
 from tests.commands import Call
 from tests.motions import smooth
 

@@ -14,7 +14,7 @@ import pytest
 
 import mcz
 from mcz import AccessError
-from mcz.container import http, http_connections
+from mcz.container import http
 from tests.commands import run
 from tests.motions import smooth, write_bytes
 from tests.web_server import Answering, Server, answer_range, serve
@@ -36,7 +36,7 @@ def server(data: bytes, retry_delays: list[float]) -> Iterator[Server]:
 def retry_delays(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The seconds that a reader would have waited between attempts."""
     found: list[float] = []
-    monkeypatch.setattr(http_connections, "sleep", found.append)
+    monkeypatch.setattr(http, "sleep", found.append)
     return found
 
 

@@ -20,7 +20,7 @@ import pytest
 import mcz
 from mcz.files import jobs
 from mcz.files.editing import coded_parts
-from mcz.files.jobs.pool import Pool
+from mcz.files.jobs import Pool
 from mcz.files.reading import parallel_clips
 from mcz.files.reading.faults import validate
 from mcz.sources.sample import write_samples
@@ -39,7 +39,7 @@ def worth_it(monkeypatch: pytest.MonkeyPatch) -> None:
 def here(
     function: Callable[[Any, Any], Any], items: Iterable[Any], jobs: int, state: Any = None
 ) -> Iterator[Iterator[Any]]:
-    """Stand-in for ``mcz.files.jobs.pool.answers``: no processes, but pickled arguments."""
+    """Stand-in for ``mcz.files.jobs.answers``: no processes, but pickled arguments."""
 
     def answer(item: Any) -> Callable[[], Any] | None:
         if item is None:
@@ -269,7 +269,7 @@ def test_full_disk_leaves_nothing(
 
 SLOW = """
 import operator, time
-from mcz.files.jobs.pool import Pool
+from mcz.files.jobs import Pool
 from mcz.files.reading import parallel_clips
 with Pool(2) as pool:
     for answer in pool.in_order(operator.eq, [1, 2]):

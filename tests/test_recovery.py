@@ -13,7 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.container.recovery import encoder
+from mcz.container.recovery import blocks as recovery_blocks
+from mcz.container.recovery.blocks import Shape, build_packet, read_packet, shape_for
 from mcz.container.recovery.code import (
     divide,
     encode_blocks,
@@ -23,7 +24,6 @@ from mcz.container.recovery.code import (
     recover_blocks,
     run_length,
 )
-from mcz.container.recovery.layout import Shape, build_packet, read_packet, shape_for
 from mcz.container.source import ByteSource
 from mcz.files.editing.protecting import protections
 from mcz.sources.sample import write_samples
@@ -173,7 +173,7 @@ def test_bad_blocks_are_solved_by_columns(
     archive: bytes, shapes: list[Shape], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same bytes, whatever fits in memory at once; one burst crosses the end of a RECV."""
-    monkeypatch.setattr(encoder, "AT_ONCE", 1 << 11)
+    monkeypatch.setattr(recovery_blocks, "AT_ONCE", 1 << 11)
     shape = shapes[0]
     for at in (100, shape.stop - shape.burst):
         bad = archive[:at] + bytes(shape.burst) + archive[at + shape.burst :]
@@ -368,10 +368,10 @@ def test_large_blocks_are_worked_on_by_columns(monkeypatch: pytest.MonkeyPatch) 
     def read(block: int) -> bytes:
         return blocks[block].tobytes()
 
-    wanted = list(encoder.encode_packets(shape, read)[1])
-    monkeypatch.setattr(encoder, "AT_ONCE", 1 << 12)
-    monkeypatch.setattr(encoder, "IN_MEMORY", 1 << 10)
-    assert list(encoder.encode_packets(shape, read)[1]) == wanted
+    wanted = list(recovery_blocks.encode_packets(shape, read)[1])
+    monkeypatch.setattr(recovery_blocks, "AT_ONCE", 1 << 12)
+    monkeypatch.setattr(recovery_blocks, "IN_MEMORY", 1 << 10)
+    assert list(recovery_blocks.encode_packets(shape, read)[1]) == wanted
 
 
 VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
@@ -485,8 +485,8 @@ def test_a_full_disk_of_temporary_files(
         def write(self, data: object) -> int:
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(encoder, "IN_MEMORY", 0)
-    monkeypatch.setattr(encoder.tempfile, "TemporaryFile", Full)
+    monkeypatch.setattr(recovery_blocks, "IN_MEMORY", 0)
+    monkeypatch.setattr(recovery_blocks.tempfile, "TemporaryFile", Full)
     path = tmp_path / "a.mcz"
     path.write_bytes(small[1])
     with pytest.raises(mcz.AccessError, match="No space left on device; recovery data take"):

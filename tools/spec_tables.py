@@ -54,7 +54,7 @@ MODULES = (
     "mcz.sources.text.notes",
     "mcz.sources.tables.source",
     "mcz.sources.c3d.layout",
-    "mcz.container.recovery.layout",
+    "mcz.container.recovery.blocks",
     "mcz.model.numbers",
 )
 NAMED = {

@@ -20,8 +20,7 @@ from mcz.files.editing.chunk_copier import Change
 from mcz.files.editing.folders import size_of
 from mcz.files.editing.rewriting import ALIAS, CLIP, SKELETON, copy_things, plan_whole
 from mcz.files.editing.stored_files import Content
-from mcz.files.jobs import DEFAULT_JOBS, Answer, useful_jobs
-from mcz.files.jobs.pool import answers
+from mcz.files.jobs import DEFAULT_JOBS, Answer, answers, useful_jobs
 from mcz.files.reading.file import open
 from mcz.files.reading.parallel_clips import only_own
 from mcz.files.reading.source_files import SourceOptions

@@ -18,8 +18,7 @@ from mcz.container.chunks import CRC, FOOT, Chunk, ChunkFlag, ChunkType, build_f
 from mcz.container.directory import Directory
 from mcz.container.index import build_index
 from mcz.container.reader import Container
-from mcz.container.recovery.encoder import Step, encode_packets
-from mcz.container.recovery.layout import Key, Shape, read_packet, shape_for
+from mcz.container.recovery.blocks import Key, Shape, Step, encode_packets, read_packet, shape_for
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, OptionError
 from mcz.files.editing.appending import IN_MEMORY, growing

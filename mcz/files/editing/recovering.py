@@ -14,17 +14,19 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mcz.container.recovery.code import LANE, encode_blocks, recover_blocks
-from mcz.container.recovery.encoder import Step, compute_lanes, encode_packets
-from mcz.container.recovery.layout import (
+from mcz.container.recovery.blocks import (
     BODY_AT,
     HASH,
     Key,
     Packet,
     Shape,
+    Step,
+    compute_lanes,
+    encode_packets,
     find_packets,
     short_hash,
 )
+from mcz.container.recovery.code import LANE, encode_blocks, recover_blocks
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError
 from mcz.files.editing.protecting import chunk_bytes

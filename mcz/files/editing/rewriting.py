@@ -22,8 +22,8 @@ from mcz.container.limits import Profile
 from mcz.container.locks import lock
 from mcz.container.metadata import Record
 from mcz.container.reader import Container
-from mcz.container.recovery import encoder
-from mcz.container.recovery.layout import check_redundancy
+from mcz.container.recovery import blocks
+from mcz.container.recovery.blocks import check_redundancy
 from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
 from mcz.errors import AccessError, FormatError, OptionError, reason_of
@@ -248,7 +248,7 @@ def protect(
     redundancy: float = DEFAULT,
     *,
     anew: bool = False,
-    progress: encoder.Step | None = None,
+    progress: blocks.Step | None = None,
 ) -> list[Protection]:
     """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
 
@@ -267,7 +267,7 @@ def protect(
 
 
 def _protected_anew(
-    target: Target, redundancy: float, progress: encoder.Step | None
+    target: Target, redundancy: float, progress: blocks.Step | None
 ) -> Protection | None:
     """Rewrite a file with recovery data for all of it; None without a change if it has none.
 

@@ -9,8 +9,7 @@ from functools import partial
 from mcz.container.checksums import ChecksumReport, check_checksums
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.reader import Container
-from mcz.container.recovery.encoder import encode_packets
-from mcz.container.recovery.layout import read_packet
+from mcz.container.recovery.blocks import encode_packets, read_packet
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.errors import (

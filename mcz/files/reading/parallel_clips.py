@@ -14,8 +14,7 @@ from typing import Any, TypeVar, cast
 
 from mcz.codecs import CODECS, ENTRIES
 from mcz.errors import FormatError
-from mcz.files.jobs import DEFAULT_JOBS, Answer, useful_jobs
-from mcz.files.jobs.pool import answers
+from mcz.files.jobs import DEFAULT_JOBS, Answer, answers, useful_jobs
 from mcz.files.reading.file import File
 from mcz.sources import FORMATS
 

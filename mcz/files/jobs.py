@@ -1,8 +1,10 @@
-"""Processes that work for this one: a function of each item, results in the order of the items.
+"""Processes that work on the files of a command: a function of each item, results in order.
+
+Parsing is Python, which threads of one process share and processes do not: packing takes half the
+time with two. Results do not depend on the number.
 
 They are separate interpreters, started without the caller's main module, so that a script needs no
 guard and running threads are not forked. If a process dies, its work is repeated by another one.
-
 Messages to a process are a length of 8 bytes and a pickle: first the number of threads and the
 pickled state, then for each call a function and an item. The reply is a flag of success, and the
 result or the error.
@@ -16,17 +18,95 @@ import signal
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager, suppress
+from contextvars import ContextVar
 from queue import SimpleQueue
 from threading import Lock
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO, Protocol, TypeVar, cast
 
-from mcz.errors import WorkerError
-from mcz.files.jobs import Answer, Item, Result, engine, threads_each
+from mcz.errors import OptionError, WorkerError
 from mcz.hints import Hint
+from mcz.model import threads
 from mcz.model.types import Settings
+
+LEAST_BYTES = 8_000_000  # of source files; fewer are done before a worker has started
+LEAST_STORED = 2_000_000  # the same, of an MCZ file
+DEFAULT_JOBS = 1  # a library must not start processes unasked
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Answer = Callable[[], Result]  # returns a result, or raises the error of the function
+
+
+class Engine(Protocol):
+    """Another engine for the work of processes."""
+
+    @property
+    def jobs(self) -> int: ...
+
+    def in_order(
+        self, function: Callable[[Any, Item], Result], items: Iterable[Item | None], state: object
+    ) -> Generator[Answer[Result] | None, None, None]: ...
+
+
+_ENGINE: ContextVar[Engine | None] = ContextVar("engine", default=None)
+_LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)
+
+
+def job_limit() -> int:
+    """Number of processes that a call may use: one by default."""
+    return _LIMIT.get() or DEFAULT_JOBS
+
+
+@contextmanager
+def limit_jobs(jobs: int | None) -> Iterator[None]:
+    """Limit the processes of calls within the block; None: keep the present limit.
+
+    Raises OptionError for a number below 1.
+    """
+    if jobs is not None and jobs < 1:
+        raise OptionError(f"jobs: {jobs}, not at least 1")
+    token = _LIMIT.set(jobs or _LIMIT.get())
+    try:
+        yield
+    finally:
+        _LIMIT.reset(token)
+
+
+def engine() -> Engine | None:
+    """Engine that works in place of processes of this machine, if any."""
+    return _ENGINE.get()
+
+
+@contextmanager
+def use_engine(engine: Engine) -> Iterator[None]:
+    """Let ``engine`` do the work of calls within the block, of any size."""
+    token = _ENGINE.set(engine)
+    try:
+        yield
+    finally:
+        _ENGINE.reset(token)
+
+
+def useful_jobs(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
+    """Number of processes that is worthwhile for so many files of so many bytes in all.
+
+    ``stored``: they are clips of an MCZ file of that size.
+    """
+    if (other := engine()) is not None:
+        return max(other.jobs, DEFAULT_JOBS + 1)
+    least = LEAST_STORED if stored else LEAST_BYTES
+    if n_bytes < least or getattr(sys, "frozen", False):  # has no interpreter to start
+        return DEFAULT_JOBS
+    return max(DEFAULT_JOBS, min(job_limit(), n_items))
+
+
+def threads_each(jobs: int) -> int:
+    """Threads of each of ``jobs`` processes: together as many as one process would use."""
+    return max(1, threads.thread_limit() // jobs)
+
 
 AHEAD = 2  # items in work or done, for each process: a bounded queue
 TRIES = 2
@@ -121,7 +201,7 @@ class Worker:
     """One process, and its two pipes."""
 
     def __init__(self, first: bytes) -> None:
-        code = "from mcz.files.jobs.pool import main; main()"
+        code = "from mcz.files.jobs import main; main()"
         code = f"import sys; sys.path[:] = {sys.path!r}; {code}"
         self.process = subprocess.Popen(
             [sys.executable, "-c", code],
