@@ -18,8 +18,7 @@ import conformance
 import mcz
 from mcz.container import payloads
 from mcz.container.writer import Writer
-from mcz.files.editing.stored_files import stored_files
-from mcz.files.editing.unpacking import safe_path
+from mcz.files.editing.unpacking import safe_path, stored_files
 from mcz.model.motion import joint_columns
 from tests.clocked_files import bvh
 from tests.web_server import Server, serve

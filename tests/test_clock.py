@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
-from mcz.files.tables.files import EVENT_EXPORTS
+from mcz.files.tables import EVENT_EXPORTS
 from mcz.model.clock import Timeline
 from tests.clocked_files import motive, npz, sto, trc, vicon
 from tests.commands import run

@@ -22,7 +22,7 @@ from mcz.container.scan import scan
 from mcz.container.source import Overlay, open_source
 from mcz.container.writer import Writer
 from mcz.files.reading.report import info
-from mcz.files.writing.write_transaction import WriteTransaction
+from mcz.files.writing.atomic import WriteTransaction
 from mcz.sources import FORMATS
 from mcz.sources.sample import write_samples
 from tests.commands import run

@@ -18,7 +18,7 @@ from mcz.container.scan import scan
 from mcz.container.value_hash import canonical
 from mcz.files.reading.faults import validate
 from mcz.files.reading.report import info
-from mcz.files.writing.write_transaction import METADATA_KEYS
+from mcz.files.writing.atomic import METADATA_KEYS
 from mcz.model.extras import annex_bytes
 from mcz.model.numbers import Grid, GridKind
 from tests.motions import motions, skeleton, smooth, write_bytes

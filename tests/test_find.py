@@ -15,8 +15,8 @@ from mcz import File, FormatError, OptionError
 from mcz.codecs import CODECS, codec_by_name
 from mcz.container.writer import Writer
 from mcz.files.queries import Query
+from mcz.files.reading.clips import FIELDS
 from mcz.files.reading.faults import part_problems
-from mcz.files.reading.fields import FIELDS
 from mcz.files.reading.report import info
 from mcz.files.writing.clip_writer import write_clip
 from mcz.model.schema import parse_until

@@ -36,7 +36,7 @@ from mcz.container.writer import Writer
 from mcz.files.live.reader_with_losses import FramesWithLosses, StreamSummary
 from mcz.files.live.strict_reader import live_frames
 from mcz.files.live.writer import LiveWriter
-from mcz.files.reading.fields import packet_framing
+from mcz.files.reading.clips import packet_framing
 from mcz.files.reading.report import info
 from mcz.files.reading.sizes import layout
 from mcz.files.writing.clip_writer import write_clip

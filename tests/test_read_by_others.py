@@ -19,7 +19,7 @@ import pytest
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.exchange.conversion import converted_files
-from mcz.files.tables.files import EXPORTS, table_of
+from mcz.files.tables import EXPORTS, table_of
 from mcz.kinematics.points import origins_of
 from mcz.model.motion import POSITION_KINDS
 from tests.commands import run

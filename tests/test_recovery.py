@@ -25,7 +25,7 @@ from mcz.container.recovery.code import (
     run_length,
 )
 from mcz.container.source import ByteSource
-from mcz.files.editing.protecting import protections
+from mcz.files.editing.appending import protections
 from mcz.sources.sample import write_samples
 from tests.amounts import amount
 from tests.clocked_files import bvh
@@ -336,7 +336,7 @@ def test_a_full_disk_costs_no_recovery_data(
 
     path = tmp_path / "a.mcz"
     path.write_bytes(archive)
-    monkeypatch.setattr("mcz.files.editing.protecting.write_recovery", full)
+    monkeypatch.setattr("mcz.files.editing.appending.write_recovery", full)
     for rewrite in (
         lambda: mcz.protect(path, 0.1, anew=True),
         lambda: mcz.delete_clips(path, "more"),

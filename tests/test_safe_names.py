@@ -13,8 +13,8 @@ import pytest
 
 import mcz
 from mcz import OptionError
-from mcz.files.editing import safe_names, unpacking
-from mcz.files.editing.safe_names import HIDDEN, PortableNames, fault_of, folded, notes_on
+from mcz.files.editing import folders, unpacking
+from mcz.files.editing.folders import HIDDEN, PortableNames, fault_of, folded, notes_on
 from mcz.files.editing.unpacking import NAMES
 from tests.commands import run
 from tests.motions import smooth
@@ -193,14 +193,14 @@ def test_a_disk_that_folds_names_loses_nothing(
 ) -> None:
     """Here the disk is made to: the second name leads to the file of the first."""
     archive, out = pack_names(tmp_path, "NOTES.TXT", "notes.txt"), tmp_path / "out"
-    write = safe_names.Folder.write
+    write = folders.Folder.write
 
-    def fold_case(self: safe_names.Folder, path: str, data: bytes, *more, **options) -> Path:
+    def fold_case(self: folders.Folder, path: str, data: bytes, *more, **options) -> Path:
         place = write(self, path, data, *more, **options)
         os.link(place, out / "notes.txt")
         return place
 
-    monkeypatch.setattr(safe_names.Folder, "write", fold_case)
+    monkeypatch.setattr(folders.Folder, "write", fold_case)
     report = mcz.unpack(archive, out, force=force)
     assert [o.path for o in report.failures] == ["notes.txt"]
     assert "names='portable' keeps both" in report.failures[0].message

@@ -39,7 +39,7 @@ from mcz.container.parser_drivers import repeated_chunks
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.container.source import open_source
-from mcz.files.live.concealment import LiveFrame
+from mcz.files.live.clip_state import LiveFrame
 from mcz.files.live.reader_with_losses import MOST_MADE_UP
 from mcz.files.reading.report import info
 from mcz.files.reading.sizes import layout

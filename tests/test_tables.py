@@ -64,7 +64,7 @@ def check(arrays: dict[str, np.ndarray], motion: Motion, scaled: bool = False) -
 def test_an_npz_says_where_everything_is(skeleton: Skeleton) -> None:
     motion = Motion(skeleton, (Signal(values_for(skeleton)),))
     kinds = {channel.kind for channel in skeleton.channels}
-    from mcz.files.tables.files import pose_arrays
+    from mcz.files.tables import pose_arrays
 
     check(pose_arrays(motion), motion, bool(kinds & {"sx", "sy", "sz", "length"}))
 

@@ -132,7 +132,7 @@ def _convert(
 
 
 def _export(clip: Clip, target: str, part: ClipSelection, options: DecodeOptions) -> Output:
-    from mcz.files.tables.files import EVENT_EXPORTS, EXPORTS, channel_names, channel_units
+    from mcz.files.tables import EVENT_EXPORTS, EXPORTS, channel_names, channel_units
 
     joints = options.joints
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
@@ -276,7 +276,7 @@ def _fit_line(fit: Fit) -> str:
 
 def _rate_notes(clip: Clip, part: ClipSelection, options: DecodeOptions) -> tuple[str, ...]:
     """Notes on text files whose stated times differ from the clip's."""
-    from mcz.files.reading.rate_notes import text_notes
+    from mcz.files.reading.fidelity import text_notes
 
     if options.decimate:
         return ()

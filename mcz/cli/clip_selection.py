@@ -16,7 +16,7 @@ from mcz.model.types import Values
 
 if TYPE_CHECKING:
     from mcz.files.reading.clip import Clip
-    from mcz.files.tables.files import Event, Table
+    from mcz.files.tables import Event, Table
     from mcz.model.clock import Timeline
     from mcz.model.motion import Motion
 
@@ -82,7 +82,7 @@ class ClipSelection:
         units: Sequence[str] = (),
     ) -> Table:
         from mcz.files.reading.views import decimate_rows
-        from mcz.files.tables.files import Table
+        from mcz.files.tables import Table
 
         clip, per_frame = self.clip, self.clip.signals[signal].samples_per_frame
         mask = np.ones(values.shape, np.bool_) if mask is None else mask
@@ -150,7 +150,7 @@ class PreviewSelection(ClipSelection):
         return preview_motion(self.clip)
 
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
-        from mcz.files.tables.files import Table
+        from mcz.files.tables import Table
 
         preview = self.clip.previewed(joints)
         numbers, rate = self.clip.frame_numbers[preview.frames], self.clip.frame_rate

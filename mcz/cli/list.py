@@ -95,7 +95,7 @@ def list_command(
 
 def _rows(file: File, clips: Sequence[Clip], names: list[str] | None) -> list[JsonObject]:
     """The values of each clip by column; without ``names`` those of the index, and its skeleton."""
-    from mcz.files.reading.fields import getter_of
+    from mcz.files.reading.clips import getter_of
 
     every = file.clips.values()
     getters: dict[str, Callable[[Clip], object]] = {

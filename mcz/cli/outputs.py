@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 CONVERSIONS = ("bvh", "amc", "c3d", "trc", "sto", "mot")
 SCENES = ("glb", "usda")  # animated nodes; mcz.exchange.conversion.scenes writes them
-NUMBERS = ("csv", "npz")  # tables; mcz.files.tables.files writes them
+NUMBERS = ("csv", "npz")  # tables; mcz.files.tables writes them
 TARGETS = (*NUMBERS, *CONVERSIONS, *SCENES)
 # Suffixes that decode does not write; a file of that name would hold something else.
 OTHERS = {
@@ -189,6 +189,6 @@ def plain_name(name: str) -> str:
     >>> plain_name("walk.bvh"), plain_name(".."), plain_name("a\0b"), plain_name("con.bvh")
     ('walk.bvh', '__', 'a_b', 'con_.bvh')
     """
-    from mcz.files.editing.safe_names import PortableNames
+    from mcz.files.editing.folders import PortableNames
 
     return PortableNames()(name.replace("/", "_")) or "_"

@@ -119,7 +119,7 @@ def replace_command(
 
 def read_values(path: str, clip: Clip, joint: str) -> NDArray[np.float64]:
     """The columns of the joint in a table, NaN where marked invalid; raises Failure."""
-    from mcz.files.tables.files import channel_names
+    from mcz.files.tables import channel_names
 
     is_npz = Path(path).suffix.lower() == ".npz"
     all_names = channel_names(clip.skeleton, clip.signals[0].channels)

@@ -53,8 +53,7 @@ from mcz.model.text_format import spreadsheet_cell
 
 if TYPE_CHECKING:
     from mcz.cli.tcp import Heart
-    from mcz.files.live.clip_state import LiveClip
-    from mcz.files.live.concealment import LiveFrame, Lost
+    from mcz.files.live.clip_state import LiveClip, LiveFrame, Lost
     from mcz.files.live.generators import LiveReader
     from mcz.files.live.writer import LiveWriter
 
@@ -362,7 +361,7 @@ def _csv(cells: list[str]) -> bytes:
 
 
 def _print_all(reader: LiveReader, printer: _TextRows | _BinaryRows) -> None:
-    from mcz.files.tables.files import channel_names
+    from mcz.files.tables import channel_names
 
     output = binary_output() if isinstance(printer, _BinaryRows) else text_output()
     clip: LiveClip | None = None

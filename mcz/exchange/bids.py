@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.errors import MotionError
-from mcz.files.tables.files import table_of
+from mcz.files.tables import table_of
 from mcz.hints import Hint
 from mcz.model.motion import Joint, Motion
 from mcz.model.text_format import printable

@@ -11,8 +11,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import mcz
 from mcz.files.editing.protecting import redundancy_of
+
+import mcz
 
 
 class Folder:

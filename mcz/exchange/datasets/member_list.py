@@ -21,7 +21,7 @@ from mcz.exchange.datasets.fields import SignalShape, Units, names_of
 from mcz.exchange.datasets.sources import MOST_OPEN, Member, Recipe, recipe_of
 from mcz.exchange.datasets.windows import Dataset
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.fields import Where, filter_clips
+from mcz.files.reading.clips import Where, filter_clips
 from mcz.files.reading.file import File, is_source, open
 from mcz.kinematics.poses.resampling import (
     MOST_VALUES,

@@ -15,8 +15,8 @@ from mcz.files.dask.packing import pack
 from mcz.files.jobs import use_engine
 from mcz.files.reading import faults
 from mcz.files.reading.clip import Clip
+from mcz.files.reading.clips import Where
 from mcz.files.reading.faults import Problem
-from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open
 from mcz.files.reading.parallel_clips import can_be_shared, share_clips
 from mcz.model.types import Target

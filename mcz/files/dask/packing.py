@@ -18,13 +18,11 @@ from mcz.files.dask.cluster import Cluster, connect
 from mcz.files.editing.archive import write_in_turn
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.coded_parts import Part, PartRequest, RemotePart, encode_part, request_of
-from mcz.files.editing.folders import NO_MOTION, files_below, motion_files, size_of
-from mcz.files.editing.safe_names import notes_on
+from mcz.files.editing.folders import NO_MOTION, files_below, motion_files, notes_on, size_of
 from mcz.files.jobs import Answer
 from mcz.files.reading.source_files import SourceOptions
-from mcz.files.writing.atomic import replacing
+from mcz.files.writing.atomic import WriteTransaction, replacing
 from mcz.files.writing.source_encoder import SourceEncoder, WritingOptions, encoding_options
-from mcz.files.writing.write_transaction import WriteTransaction
 from mcz.hints import Remark
 from mcz.model.types import Params, Progress, Target
 from mcz.sources import wants_skeleton

@@ -3,7 +3,7 @@
 Modules of protection and repair, here and in other folders:
 
     rewriting.py                        ``protect``: adds recovery data to a file
-    protecting.py                       computes recovery data and appends them
+    appending.py                        computes recovery data and appends them
     repair.py                           ``repair``: plans the new file, reports what is lost
     recovering.py                       restores damaged bytes from recovery data
     salvage_copier.py                   copies the intact parts of a damaged file

@@ -14,7 +14,7 @@ from mcz.container import payloads
 from mcz.container.limits import profile_named
 from mcz.container.metadata import SETTABLE, Record
 from mcz.errors import MczError, OptionError, SourceError, remark_of
-from mcz.files.editing.appending import growing
+from mcz.files.editing.appending import growing, redundancy_of, still_protect
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.chunk_copier import UNPROTECTED
 from mcz.files.editing.coded_parts import RemotePart, encode_ahead
@@ -23,21 +23,19 @@ from mcz.files.editing.folders import (
     files_below,
     find_sources,
     motion_files,
+    notes_on,
     size_of,
     skipped_outcome,
     stamp,
 )
 from mcz.files.editing.merging import add_files
 from mcz.files.editing.metadata_edit import set_metadata
-from mcz.files.editing.protecting import redundancy_of, still_protect
 from mcz.files.editing.reorganize import delete_clips
-from mcz.files.editing.safe_names import notes_on
-from mcz.files.editing.stored_files import Content, stored_files
+from mcz.files.editing.unpacking import Content, stored_files
 from mcz.files.reading.file import File, open
 from mcz.files.reading.source_files import SourceOptions, read_bytes
-from mcz.files.writing.atomic import refuse_inputs, replacing
+from mcz.files.writing.atomic import WriteTransaction, check_name, refuse_inputs, replacing
 from mcz.files.writing.source_encoder import SourceEncoder, WritingOptions, encoding_options
-from mcz.files.writing.write_transaction import WriteTransaction, check_name
 from mcz.hints import split_hint
 from mcz.model.types import Params, Progress, Target
 from mcz.sources import wants_skeleton

@@ -19,13 +19,13 @@ from mcz.errors import MczError, WorkerError
 from mcz.files.editing.chunk_copier import Change
 from mcz.files.editing.folders import size_of
 from mcz.files.editing.rewriting import ALIAS, CLIP, SKELETON, copy_things, plan_whole
-from mcz.files.editing.stored_files import Content
+from mcz.files.editing.unpacking import Content
 from mcz.files.jobs import DEFAULT_JOBS, Answer, answers, useful_jobs
 from mcz.files.reading.file import open
 from mcz.files.reading.parallel_clips import only_own
 from mcz.files.reading.source_files import SourceOptions
+from mcz.files.writing.atomic import WriteTransaction, check_name, clip_name
 from mcz.files.writing.source_encoder import EncodingOptions, SourceEncoder
-from mcz.files.writing.write_transaction import WriteTransaction, check_name, clip_name
 from mcz.sources import wants_skeleton
 
 

@@ -1,7 +1,7 @@
 """``extract``: frames, joints and coarser resolutions cut out of the stored bytes of a file.
 
 Streams are copied byte for byte, SPEC.md, "Cutting without re-encoding". A clip that cannot be cut
-is decoded and encoded again (``reencode.py``), if the caller allows it.
+is decoded and encoded again (``recoding.py``), if the caller allows it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from mcz.files.editing.cutting import (
     plan_cut,
     recoded_quality,
 )
-from mcz.files.editing.reencode import (
+from mcz.files.editing.recoding import (
     OF_JOINTS,
     check_anew,
     joints_alone,
@@ -41,7 +41,7 @@ from mcz.files.editing.reencode import (
 )
 from mcz.files.editing.rewriting import writer_like
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.fields import Where
+from mcz.files.reading.clips import Where
 from mcz.files.reading.file import File, open
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.files.reading.source_info import stating_rate

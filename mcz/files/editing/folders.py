@@ -1,20 +1,214 @@
-"""The files below a folder that are packed, their order and names, and their times (``mtime``)."""
+"""Folders on disk: files to pack, names that every system can hold, and files written safely."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+import stat
+import unicodedata
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
-from mcz.errors import AccessError, OptionError, reason_of, remark_of
+from mcz.errors import AccessError, ExistsError, OptionError, reason_of, remark_of
 from mcz.files.editing.batch_report import Outcome
 from mcz.files.reading.clips import MOST_NAMES, list_some
+from mcz.files.writing.atomic import replacing
 from mcz.hints import Hint, Remark
 from mcz.model.types import Target
 from mcz.sources import FORMATS
+
+ODD = re.compile(r'[<>:"|?*\\]')
+# Controls, what turns the direction of text, line ends and other characters that are not seen; but
+# not the joiners that some scripts and emoji are spelled with.
+HIDDEN = re.compile(
+    "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff"
+    "\ufff9-\ufffb\U000e0001-\U000e007f]"
+)
+DEVICES = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])[ ]*(\..*)?")
+LONGEST = 255  # bytes of UTF-8 that a part of a path may have
+
+
+def fault_of(part: str) -> str:
+    """Name the fault of a path's part that is invalid on some systems; "" for none."""
+    if odd := HIDDEN.search(part) or ODD.search(part):
+        return f"it has {odd[0]!a}"
+    if DEVICES.fullmatch(part):
+        return "it names a device"
+    if part != part.rstrip(" ."):
+        return f"it ends with {part[-1]!r}"
+    if len(part.encode("utf-8", "surrogatepass")) > LONGEST:
+        return f"it is longer than {LONGEST}"
+    return ""
+
+
+def folded(name: str) -> str:
+    """Fold a name as disks that ignore case or accents do."""
+    if name.isascii():
+        return name.lower()
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFKC", name).casefold())
+
+
+def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[str, str]:
+    """Reasons by path, for each that is invalid on some systems, alone or next to another.
+
+    ``of``: the paths to check, None: all.
+    """
+    notes: dict[str, str] = {}
+    seen: dict[str, str] = {}
+    for name in names:
+        is_asked = of is None or name in of
+        for part in PurePosixPath(name).parts if is_asked else ():
+            if fault := fault_of(part):
+                who = "unpack does not write" if HIDDEN.search(part) else "Windows cannot hold"
+                notes.setdefault(name, f"{who} the name {part!r}: {fault}")
+        path = name
+        while path:
+            other = seen.setdefault(folded(path), path)
+            if other != path:
+                if is_asked:
+                    text = f"many disks take {path!r} for the same name as {other!r}"
+                    notes.setdefault(name, text)
+                break
+            path = path.rpartition("/")[0]
+    return notes
+
+
+class PortableNames:
+    """Gives paths names that are valid on every system, also next to each other.
+
+    ``change`` makes such a name of a part of a path; ``taken`` names are never given.
+    """
+
+    def __init__(
+        self, change: Callable[[str], str] | None = None, taken: Iterable[str] = ()
+    ) -> None:
+        self._change = _portable if change is None else change
+        self._given: dict[str, str] = {}  # parts of a path, joined by "/" -> their new name
+        self._taken = set(map(folded, taken))
+
+    def __call__(self, path: str) -> str:
+        """The path, or one like it: the same for the same folder, another for another file."""
+        above, _, part = path.rpartition("/")
+        if path not in self._given:
+            folder = f"{self(above)}/" if above else ""
+            self._given[path] = self._free(folder, self._change(part))
+        return self._given[path]
+
+    def _free(self, folder: str, part: str) -> str:
+        stem, dot, suffix = part.rpartition(".") if "." in part[1:] else (part, "", "")
+        name, number = part, 1
+        while folded(folder + name) in self._taken:
+            number += 1
+            name = f"{stem}~{number}{dot}{suffix}"
+        self._taken.add(folded(folder + name))
+        return folder + name
+
+
+def visible(part: str) -> str:
+    """Replace each invisible character of a part of a path by ``_``.
+
+    >>> visible("a:b" + chr(0x202E) + "gpj.c3d"), visible("Icon" + chr(13))
+    ('a:b_gpj.c3d', 'Icon_')
+    """
+    return HIDDEN.sub("_", part)
+
+
+def _portable(part: str) -> str:
+    """
+    >>> [_portable(name) for name in ("a:b", "CON", "nul.bvh", "walk. ", "walk.bvh")]
+    ['a_b', 'CON_', 'nul_.bvh', 'walk__', 'walk.bvh']
+    """
+    part = ODD.sub("_", visible(part))
+    bare = part.rstrip(" .")
+    part = bare + "_" * (len(part) - len(bare))
+    if DEVICES.fullmatch(part):
+        stem, dot, rest = part.partition(".")
+        part = f"{stem.rstrip(' ')}_{dot}{rest}"
+    while fault_of(part):  # too long
+        stem, dot, suffix = part.rpartition(".")
+        part = f"{stem[:-1]}{dot}{suffix}" if dot and len(suffix) < 16 else part[:-1]
+    return part
+
+
+class Folder:
+    """A folder of new files; links in it are not followed, and no file is written twice."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._written: dict[tuple[int, int], str] = {}  # device and number of a file -> its path
+
+    def place(self, path: str, *, force: bool) -> Path:
+        """Return the place of the file ``path``, with the folders above it created.
+
+        Raises AccessError where a link, or something other than a file or folder, is in the way,
+        and ExistsError for an existing file, which with ``force`` is one that was just written: the
+        disk does not distinguish the two names.
+        """
+        parts = PurePosixPath(path).parts
+        if os.name == "nt":
+            for part in parts:
+                if fault := fault_of(part):
+                    raise AccessError(f"this system cannot hold the name {part!r}: {fault}")
+        self._root.mkdir(parents=True, exist_ok=True)
+        place = self._root
+        for part in parts[:-1]:
+            place = place / part
+            status = _lstat(place)
+            if status is None:
+                place.mkdir(exist_ok=True)
+            elif not stat.S_ISDIR(status.st_mode) or _is_junction(place):
+                raise AccessError(f"it is {_kind(status)}, where a folder is needed", path=place)
+        place = place / parts[-1]
+        status = _lstat(place)
+        if status is None:
+            return place
+        if not stat.S_ISREG(status.st_mode):
+            raise AccessError(f"it is {_kind(status)}, which is not written to", path=place)
+        if (other := self._written.get((status.st_dev, status.st_ino))) is not None:
+            raise ExistsError(
+                f"this disk takes it for the same name as {other!r}, which was just written",
+                hint=Hint.PORTABLE_NAMES,
+            )
+        if not force:
+            raise ExistsError("it exists", path=place, hint=Hint.FORCE)
+        return place
+
+    def write(self, path: str, data: bytes, source: Target, *, force: bool, name: str = "") -> Path:
+        """Write the file ``path`` from ``source``; return its place, as ``place``.
+
+        ``name`` is its name for the error if another file has its place.
+        """
+        place = self.place(path, force=force)
+        with replacing(place, force=force, inputs=(source,)) as stream:
+            stream.write(data)
+        if (status := _lstat(place)) is not None:
+            self._written[status.st_dev, status.st_ino] = name or path
+        return place
+
+
+def _lstat(place: Path) -> os.stat_result | None:
+    try:
+        return place.lstat()
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise AccessError(reason_of(error), path=place) from None
+
+
+def _is_junction(place: Path) -> bool:
+    attributes = getattr(place.lstat(), "st_file_attributes", 0)
+    return bool(attributes & getattr(stat, "FILE_ATTRIBUTE_REPARSE_POINT", 0))
+
+
+def _kind(status: os.stat_result) -> str:
+    if stat.S_ISLNK(status.st_mode):
+        return "a symbolic link"
+    if stat.S_ISDIR(status.st_mode):
+        return "a folder"
+    return "a file" if stat.S_ISREG(status.st_mode) else "neither a file nor a folder"
+
 
 SNIFFED = 2**16  # bytes at the start that show the type of a file
 

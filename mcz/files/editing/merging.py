@@ -17,9 +17,9 @@ from pathlib import PurePosixPath
 from mcz.container import payloads
 from mcz.container.writer import Writer
 from mcz.errors import OptionError
+from mcz.files.editing.appending import protect_written, redundancy_of
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.chunk_copier import UNPROTECTED, Change
-from mcz.files.editing.protecting import protect_written, redundancy_of
 from mcz.files.editing.rewriting import (
     ALIAS,
     ATTACHMENT,
@@ -36,8 +36,7 @@ from mcz.files.editing.rewriting import (
 )
 from mcz.files.reading.clips import list_some
 from mcz.files.reading.file import File, open
-from mcz.files.writing.atomic import replacing_file
-from mcz.files.writing.write_transaction import WriteTransaction
+from mcz.files.writing.atomic import WriteTransaction, replacing_file
 from mcz.model.schema import parse
 from mcz.model.text_format import counted, shown
 from mcz.model.types import Progress, Target

@@ -21,16 +21,14 @@ from mcz.container.metadata import (
 )
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, OptionError, reason_of
-from mcz.files.editing.appending import growing
+from mcz.files.editing.appending import growing, redundancy_of, still_protect
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.chunk_copier import Change
-from mcz.files.editing.protecting import redundancy_of, still_protect
 from mcz.files.editing.rewriting import CLIP, plan_whole, rewriting, steps
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.clips import list_some, names_of
-from mcz.files.reading.fields import Where
+from mcz.files.reading.clips import Where, list_some, names_of
+from mcz.files.reading.fidelity import states_rate
 from mcz.files.reading.file import File, open
-from mcz.files.reading.rate_notes import states_rate
 from mcz.model.motion import frame_rate_of
 from mcz.model.text_format import among, cell_text, shown
 from mcz.model.types import Progress, Target

@@ -1,4 +1,8 @@
-"""Encode the streams of one joint with other values as the clip was; no file is written here."""
+"""Decode a joint or a whole clip and encode it again; no file is written here.
+
+``replacing.py`` uses both, ``extraction.py`` the latter. SPEC.md, "Cutting without re-encoding"
+and "Replacing a joint", are normative.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +15,23 @@ from numpy.typing import ArrayLike, NDArray
 from mcz.codecs.contract import Codec, RecodeRequest, Request
 from mcz.codecs.parameters import TARGETS
 from mcz.errors import MotionError, OptionError
-from mcz.files.editing.cutting import coded_together, groups_of
+from mcz.files.editing.cutting import (
+    WITHOUT_CHANNELS,
+    ClipCut,
+    add_note,
+    coded_together,
+    groups_of,
+    joint_of_column,
+)
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.signal_reader import SignalReader
+from mcz.files.reading.source_info import stating_rate
 from mcz.files.writing.quality import with_values
 from mcz.files.writing.signal_source import MAX_INTEGER, MemorySource, settle
 from mcz.model.motion import Motion, Signal
 from mcz.model.types import Settings
+from mcz.sources import FORMATS
 
 Streams = dict[tuple[int, int], tuple[bytes, ...]]  # (segment, group) -> by stored resolution
 
@@ -46,12 +59,11 @@ class Recoded:
         """Group notes and masks of the joint's groups for the segment start <= f < stop."""
         if self.info.codec.domain == "ordinals":
             self.source.ordinals(start, stop)  # computes the exceptions
-        notes_and_masks = self.source.group_notes(start, stop), self.source.masks(start, stop)
-        notes, masks = (
-            {group: streams[group] if streams else b"" for group in self.groups}
-            for streams in notes_and_masks
-        )
-        return notes, masks
+        notes, masks = self.source.group_notes(start, stop), self.source.masks(start, stop)
+        return self._own(notes), self._own(masks)
+
+    def _own(self, streams: Sequence[bytes]) -> dict[int, bytes]:
+        return {group: streams[group] if streams else b"" for group in self.groups}
 
 
 def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Recoded:
@@ -65,10 +77,10 @@ def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool)
     columns, motion = list(clip.skeleton.columns(edited.joint)), edited.motion
     signal = motion.signals[0]
     source = _codec_source(clip, info, signal)
-    reader = SignalReader(clip.container, info, tuple(range(len(info.layout.groups))), 0, clip.name)
+    reader = SignalReader(clip.container, info, None, 0, clip.name)
     coded = groups if info.codec.subset is None else reader.groups
-    streams = _recode_streams(clip, info, source, coded, reader)
-    decoded = _decode_recoded(info, signal, source, streams, groups, reader)
+    streams = _recode_streams(clip, source, coded, reader)
+    decoded = _decode_recoded(signal, source, streams, groups, reader)
     n_segments = range(len(info.rows))
     n_resolutions = range(info.counts.n_resolutions)
     with np.errstate(invalid="ignore"):  # infinities
@@ -231,9 +243,7 @@ def _with_hidden(clip: Clip, info: SignalInfo, shown: Signal) -> Signal:
     per_frame, n_stored = info.layout.samples_per_frame, info.layout.n_frames
     start, stop = info.skip, n_stored - info.spare
     known = n_stored if info.codec.lossless else stop
-    groups = tuple(range(len(info.layout.groups)))
-    reader = SignalReader(clip.container, info, groups, 0, clip.name)
-    stored = reader.signal(0, known)
+    stored = SignalReader(clip.container, info, None, 0, clip.name).signal(0, known)
     rows = slice(start * per_frame, stop * per_frame)
     values = stored.values
     values[rows] = shown.values
@@ -254,12 +264,9 @@ def _with_hidden(clip: Clip, info: SignalInfo, shown: Signal) -> Signal:
 
 
 def _recode_streams(
-    clip: Clip,
-    info: SignalInfo,
-    source: MemorySource,
-    groups: tuple[int, ...],
-    reader: SignalReader,
+    clip: Clip, source: MemorySource, groups: tuple[int, ...], reader: SignalReader
 ) -> Streams:
+    info = reader.info
     assert info.codec.recode is not None
     spans, options = info.spans, recorded_options(info.codec, clip.quality or {})
     coded = info.codec.recode(
@@ -288,7 +295,6 @@ def recorded_options(codec: Codec, quality: Mapping[str, str]) -> Settings:
 
 
 def _decode_recoded(
-    info: SignalInfo,
     signal: Signal,
     source: MemorySource,
     streams: Streams,
@@ -300,6 +306,7 @@ def _decode_recoded(
         coded = streams.get((segment, group))
         return reader.fetch(segment, resolution, group) if coded is None else coded[resolution]
 
+    info = reader.info
     start, stop = info.skip, info.layout.n_frames - info.spare
     request = Request(start, stop, groups)
     decoded = info.codec.decode(info.header, info.layout, info.spans, request, fetch)
@@ -316,3 +323,96 @@ def _decode_recoded(
         if (decoded[(a - start) * per_frame : (b - start) * per_frame] != ordinals).any():
             raise AssertionError(f"codec {info.codec.name}: the joint does not come back")
     return signal if signal.values.dtype == np.int64 else settle(signal)[1]
+
+
+OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may be missing
+
+
+def check_anew(clip: Clip, *, whole: bool = False) -> None:
+    """Raise OptionError for a clip that cannot be encoded again; ``whole``: all joints."""
+    info = clip.signals[0]
+    if info.exact and not (whole and "param.lossless" in (clip.quality or {})):
+        raise OptionError(
+            "some of its joints are coded exactly, and would not be any more", clip=clip.name
+        )
+    if not info.codec.lossless and (clip.quality or {}).get("codec") != info.codec.name:
+        raise OptionError(
+            "no quality record states its settings; decode it and encode it again", clip=clip.name
+        )
+
+
+def settings_of(clip: Clip) -> Settings:
+    """The settings of a clip that differ from the defaults."""
+    codec = clip.signals[0].codec
+    usual = codec.options({})
+    settings = recorded_options(codec, clip.quality or {})
+    if codec.promise:
+        settings.pop("preset", None)  # the setting of the dial is its result
+    return {name: value for name, value in settings.items() if value != usual[name]}
+
+
+def with_own_source(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
+    """The rest of ``clip`` with a source of its own values, or without one and the reason."""
+    motion = stating_rate(motion, clip.frame_numbers)
+    if motion.source is None:
+        return motion, None
+    source = motion.source.of_no_file()
+    try:
+        FORMATS[source.format].write(replace(motion, source=source))
+    except MotionError as error:
+        metadata = dict(motion.metadata)
+        add_note(metadata, "source-note", f"the source file was left out: {error}")
+        left = replace(motion, metadata=metadata).without_source()
+        return left.at_times(motion.timeline), str(error)
+    signals = tuple(map(_on_binary_grids, motion.signals))
+    return replace(motion, signals=signals, source=source), None
+
+
+def _on_binary_grids(signal: Signal) -> Signal:
+    if all(grid.is_text for _, _, grid in signal.grid_blocks()):
+        return signal
+    ordinals, exact = signal.to_ordinals()
+    values = signal.values.copy()
+    for rows, columns, grid in signal.grid_blocks():
+        nearest = grid.values(ordinals[rows][:, columns])
+        stray = ~exact[rows][:, columns] & np.isfinite(nearest)
+        if not grid.is_text:
+            values[rows, columns] = np.where(stray, nearest, values[rows, columns])
+    return replace(signal, values=values)
+
+
+def joints_alone(cut: ClipCut) -> Motion:
+    """Decode the joints of a cut: other joints have no channels, and there is no source."""
+    motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
+    if cut.joints is None:
+        return motion
+    owners = np.array(joint_of_column(motion.skeleton))
+    columns = np.flatnonzero(np.isin(owners, sorted(cut.joints)))
+    joints = tuple(
+        joint if index in cut.joints else replace(joint, channels=())
+        for index, joint in enumerate(motion.skeleton.joints)
+    )
+    skeleton = replace(motion.skeleton, joints=joints, base=cut.clip.skeleton_id, source=None)
+    whole = motion.signals[0]
+    number = {int(column): place for place, column in enumerate(columns)}
+    signal = Signal(
+        whole.values[:, columns],
+        grids=tuple(whole.grids[column] for column in columns),
+        name=whole.name,
+        mask=None if whole.mask is None else whole.mask[:, columns],
+        grid_changes=tuple((r, number[c], g) for r, c, g in whole.grid_changes if c in number),
+        ordinals=None if whole.ordinals is None else whole.ordinals[:, columns],
+    )
+    metadata = dict(motion.metadata)
+    add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
+    signals = (signal, *motion.signals[1:])
+    made = replace(motion, skeleton=skeleton, signals=signals, source=None, metadata=metadata)
+    return made.at_times(motion.timeline)
+
+
+def settings_of_joints(clip: Clip) -> Settings:
+    """The settings of a clip that suit some of its joints alone."""
+    codec = clip.signals[0].codec
+    settings = {k: v for k, v in settings_of(clip).items() if k not in OF_JOINTS}
+    # Point positions of the base are kept: with fewer joints they would be derived again.
+    return settings | {"domain": "channels"} if codec.has("domain") else settings

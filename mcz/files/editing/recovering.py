@@ -29,7 +29,7 @@ from mcz.container.recovery.blocks import (
 from mcz.container.recovery.code import LANE, encode_blocks, recover_blocks
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError
-from mcz.files.editing.protecting import chunk_bytes
+from mcz.files.editing.appending import chunk_bytes
 from mcz.files.reading.file import open_bytes
 from mcz.model.indexing import merged_ranges
 from mcz.model.text_format import brief

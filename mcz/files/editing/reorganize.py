@@ -17,6 +17,7 @@ from mcz.container.chunks import ChunkType
 from mcz.errors import ExistsError, OptionError
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.chunk_copier import UNCHANGED, Change
+from mcz.files.editing.folders import PortableNames
 from mcz.files.editing.rewriting import (
     ALIAS,
     ATTACHMENT,
@@ -34,13 +35,11 @@ from mcz.files.editing.rewriting import (
     used_by,
     used_by_skeleton,
 )
-from mcz.files.editing.safe_names import PortableNames
 from mcz.files.queries import Value
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.clips import list_some, matching_clips
-from mcz.files.reading.fields import Where, getter_of
+from mcz.files.reading.clips import Where, getter_of, list_some, matching_clips
 from mcz.files.reading.file import File, open
-from mcz.files.writing.write_transaction import check_name
+from mcz.files.writing.atomic import check_name
 from mcz.hints import Hint
 from mcz.model.text_format import counted, nearest, shown
 from mcz.model.types import Progress, Target

@@ -355,8 +355,7 @@ def whole_parts(clip: Clip) -> list[tuple[Run, tuple[int, ...]]]:
     """Runs of frames of a clip opened for salvage, and the signals that can be decoded in each."""
     runs: list[list[Run]] = []
     for info in clip.signals:
-        groups = tuple(range(info.counts.n_groups))
-        reader = SignalReader(clip.container, info, groups, 0, clip.name)
+        reader = SignalReader(clip.container, info, None, 0, clip.name)
         try:
             whole = reader.whole_runs(info.skip, info.skip + clip.n_frames)
         except MczError:  # its header, or a codec that is unknown here

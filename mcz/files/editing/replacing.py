@@ -21,8 +21,15 @@ from mcz.container.segments import GROUP_NOTES, MASKS, GroupNotes, SegmentHeader
 from mcz.container.value_hash import value_hash
 from mcz.files.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
 from mcz.files.editing.extraction import Copier, Copying
-from mcz.files.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
-from mcz.files.editing.reencode import check_anew, settings_of
+from mcz.files.editing.recoding import (
+    Edited,
+    Recoded,
+    check_anew,
+    edit,
+    is_coded_with_others,
+    recode_joint,
+    settings_of,
+)
 from mcz.files.editing.rewriting import disk_path, lock_file
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open

@@ -27,6 +27,14 @@ from mcz.container.recovery.blocks import check_redundancy
 from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
 from mcz.errors import AccessError, FormatError, OptionError, reason_of
+from mcz.files.editing.appending import (
+    DEFAULT,
+    Protection,
+    add_recovery,
+    protect_written,
+    protection_of,
+    redundancy_of,
+)
 from mcz.files.editing.batch_report import Report
 from mcz.files.editing.chunk_copier import (
     UNCHANGED,
@@ -34,14 +42,6 @@ from mcz.files.editing.chunk_copier import (
     Change,
     ChunkCopier,
     metadata_records,
-)
-from mcz.files.editing.protecting import (
-    DEFAULT,
-    Protection,
-    add_recovery,
-    protect_written,
-    protection_of,
-    redundancy_of,
 )
 from mcz.files.reading.file import File, open
 from mcz.files.reading.sizes import models_used

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcz.errors import FormatError, MotionError, OptionError, TruncatedError
-from mcz.files.live.clip_state import LiveClip
-from mcz.files.live.concealment import LOST, LiveFrame, Lost
+from mcz.files.live.clip_state import LOST, LiveClip, LiveFrame, Lost
 from mcz.files.live.reader_with_losses import FramesWithLosses, StreamSummary
 from mcz.files.live.strict_reader import StrictFrames
 from mcz.files.live.writer import LiveWriter

@@ -29,8 +29,16 @@ from mcz.errors import (
     TruncatedError,
     UnsupportedError,
 )
-from mcz.files.live.clip_state import ClipState, LiveClip, Shared, begin_clip, row_of
-from mcz.files.live.concealment import Concealer, LiveFrame, Lost
+from mcz.files.live.clip_state import (
+    ClipState,
+    Concealer,
+    LiveClip,
+    LiveFrame,
+    Lost,
+    Shared,
+    begin_clip,
+    row_of,
+)
 from mcz.model.schema import MAX_COUNT, parse
 from mcz.model.text_format import brief
 

@@ -24,8 +24,7 @@ from mcz.container.scanner import Scanner
 from mcz.container.segments import FRESH
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, OptionError
-from mcz.files.live.clip_state import ClipState, LiveClip, Shared, begin_clip, opening
-from mcz.files.live.concealment import LiveFrame
+from mcz.files.live.clip_state import ClipState, LiveClip, LiveFrame, Shared, begin_clip, opening
 from mcz.files.live.reader_with_losses import StreamSummary
 from mcz.files.reading.clip import Clip
 from mcz.model.schema import parse

@@ -25,6 +25,7 @@ from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
 from mcz.files.reading.stored_clip import with_indices
+from mcz.files.writing.atomic import check_metadata
 from mcz.files.writing.clip_writer import begin_open_clip
 from mcz.files.writing.planning import (
     Prepared,
@@ -37,7 +38,6 @@ from mcz.files.writing.planning import (
 )
 from mcz.files.writing.quality import CHUNK, RunningFigures, quality_payload, texts_of
 from mcz.files.writing.signal_source import MemorySource
-from mcz.files.writing.write_transaction import check_metadata
 from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.model.motion import Motion, Signal, Skeleton

@@ -342,7 +342,7 @@ class Clip(StoredClip):
         self, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
     ) -> Dataset:
         """The whole clip as an ``xarray.Dataset``: see ``mcz.to_xarray``."""
-        from mcz.files.tables.labelled import to_xarray
+        from mcz.files.tables import to_xarray
 
         return to_xarray(self.motion(), form=form, unit=unit, dtype=dtype)
 
@@ -355,7 +355,7 @@ class Clip(StoredClip):
         flat: bool = False,
     ) -> DataFrame:
         """A table of the whole clip as a ``pandas.DataFrame``: see ``mcz.to_pandas``."""
-        from mcz.files.tables.labelled import to_pandas
+        from mcz.files.tables import to_pandas
 
         return to_pandas(self.motion(), what, joints=joints, unit=unit, flat=flat)
 

@@ -1,20 +1,207 @@
-"""The clips of a file, each created on access by its name, as users write it."""
+"""The clips of a file, found by any of their names or by a query of their fields.
+
+docs/reference/queries.md describes the fields. The first ones of the table are in the index of the
+file, the others read the CLIP or the skeleton of the clip.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, TypeAlias
 from weakref import WeakValueDictionary
 
+from mcz.codecs import codec_by_id
 from mcz.container import payloads
-from mcz.container.directory import ClipRow
+from mcz.container.chunks import FRAMING, HEADER, ChunkType
+from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.metadata import SETTABLE, SPELLINGS, Record
+from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.container.reader import Container
-from mcz.errors import FormatError, OptionError, UnknownNameError
+from mcz.errors import FormatError, OptionError, UnknownNameError, UnsupportedError
 from mcz.files.reading.clip import Clip
 from mcz.model import text_format
-from mcz.model.text_format import nearest
+from mcz.model.text_format import among, nearest
+from mcz.sources import format_by_id
+
+if TYPE_CHECKING:
+    from mcz.files.queries import Query, Value
+
+Where: TypeAlias = "str | Query | Callable[[Clip], bool]"
+Getter: TypeAlias = "Callable[[Clip], Value]"
+# Short names of fields, among them headings of listings.
+SHORT = {
+    "clip": "name",
+    "frames": "n_frames",
+    "channels": "n_channels",
+    "joints": "n_joints",
+    "rate": "frame_rate",
+    "fps": "frame_rate",
+    "unit": "unit_cm",
+    "up": "up_axis",
+}
+METADATA = "metadata."  # before a key that is also the name of a field
+
+
+def filter_clips(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> Iterator[Clip]:
+    """Filter ``clips``, one by one, by the query ``where``; ``of`` are all clips of their file.
+
+    Raises OptionError for a malformed query, and for a name that is unknown in all clips.
+    """
+    from mcz.files.queries import Query
+
+    if isinstance(where, str):
+        where = Query(where)
+    if isinstance(where, Query):
+        where = _matcher(where, of)
+    elif not callable(where):
+        raise OptionError(f"where is {where!r}, neither a text nor a function of a clip")
+    return filter(where, clips)
+
+
+def _matcher(query: Query, clips: Collection[Clip]) -> Callable[[Clip], bool]:
+    getters = {name: _query_getter(query, name, clips) for name in query.names if clips}
+
+    def matches(clip: Clip) -> bool:
+        return query.matches(lambda name: getters[name](clip))
+
+    return matches
+
+
+def _query_getter(query: Query, name: str, clips: Collection[Clip]) -> Getter:
+    getter = _find_getter(name, clips)
+    if getter is None:
+        raise query.unknown(name, _known_names(name, clips))
+    return getter
+
+
+def getter_of(name: str, clips: Collection[Clip]) -> Getter:
+    """Return the getter of a field, or of a metadata key that any of ``clips`` has.
+
+    Raises OptionError for a name that is neither.
+    """
+    getter = _find_getter(name, clips)
+    if getter is None:
+        known_names = among(sorted(_known_names(name, clips)), name)
+        raise OptionError(
+            f"{name!r} is neither a field nor a metadata key; known are {known_names}"
+        )
+    return getter
+
+
+def _find_getter(name: str, clips: Collection[Clip]) -> Getter | None:
+    if name in FIELDS:
+        return FIELDS[name]
+    key = name.removeprefix(METADATA)
+    key = SPELLINGS.get(key, key)
+    is_key = key in SETTABLE or any(_last_record(key, clip) for clip in clips)
+    is_key = is_key or any(key in clip.metadata for clip in clips)
+    if is_key:
+        return partial(_metadata, key)
+    return FIELDS[SHORT[name]] if name in SHORT else None
+
+
+def _known_names(name: str, clips: Collection[Clip]) -> list[str]:
+    keys = {key for clip in clips for key in clip.metadata}
+    return [METADATA + key for key in keys] if name.startswith(METADATA) else [*FIELDS, *keys]
+
+
+def _metadata(key: str, clip: Clip) -> Value:
+    """Its value; CLIP is not read if a later META decides."""
+    last = _last_record(key, clip)
+    return clip.metadata.get(key) if last is None else last.entries.get(key)
+
+
+def _last_record(key: str, clip: Clip) -> Record | None:
+    records = reversed(clip.container.metadata_records(clip.name))
+    return next((r for r in records if key in r.entries or key in r.removed), None)
+
+
+def _frame_rate(clip: Clip) -> Value:
+    rate = clip.frame_rate
+    return None if rate is None else float(rate)
+
+
+def _duration(clip: Clip) -> Value:
+    rate = clip.frame_rate
+    return None if rate is None else float(clip.n_frames / rate)
+
+
+def _lossless(clip: Clip) -> Value:
+    try:
+        return all(
+            codec_by_id(s.codec, s.codec_version, s.preset).lossless for s in _row(clip).signals
+        )
+    except UnsupportedError:
+        return None
+
+
+def _bytes(clip: Clip) -> Value:
+    """The clip's own chunks, CLIP, DATA, CEND and QUAL; not its skeleton nor its template."""
+    row = _row(clip)
+    chunks = [row.clip, *(chunk for chunk in row.ancillary if chunk.type == ChunkType.QUAL)]
+    chunks += [row.cend] if row.cend else []
+    closed = FRAMING * sum(not segment.packet for segment in row.segments)
+    coded = sum(segment.size for segment in row.segments) + packet_framing(row.segments)
+    return sum(chunk.size for chunk in chunks) + closed + coded
+
+
+def packet_framing(rows: Sequence[SegmentRow]) -> int:
+    """The bytes of open DATA outside of the bodies of their packets; ``rows`` in file order."""
+    total = n_packets = end = 0
+    for row in rows:
+        if row.packet:
+            head = head_size(n_packets, row.size)
+            if not n_packets or row.offset - end != CHECK_SIZE + head:  # another DATA
+                total += _end_size(n_packets) + HEADER.size
+                n_packets, head = 0, head_size(0, row.size)
+            total += head + CHECK_SIZE
+            n_packets += 1
+        end = row.stop
+    return total + _end_size(n_packets)
+
+
+def _end_size(n_packets: int) -> int:
+    return head_size(n_packets, 0) + CHECK_SIZE if n_packets else 0
+
+
+def _row(clip: Clip) -> ClipRow:
+    return clip.container.directory.clips[clip.name]
+
+
+def _source(clip: Clip) -> Value:
+    source = clip._fields.source
+    return source.path or None if source else None
+
+
+def _format(clip: Clip) -> Value:
+    """The usual suffix of the source's format, without the dot."""
+    source = clip._fields.source
+    return format_by_id(source.format).suffixes[0][1:] if source else None
+
+
+FIELDS: dict[str, Getter] = {
+    "name": lambda clip: clip.name,
+    "n_frames": lambda clip: clip.n_frames,
+    "frame_rate": _frame_rate,
+    "duration": _duration,
+    "n_channels": lambda clip: clip.n_channels,
+    "codec": lambda clip: clip.codec,
+    "lossless": _lossless,
+    "bytes": _bytes,
+    "source": _source,
+    "format": _format,
+    "skeleton": lambda clip: clip.skeleton.name or None,
+    "n_joints": lambda clip: clip.skeleton.n_joints,
+    "unit_cm": lambda clip: clip.skeleton.unit_cm,
+    "up_axis": lambda clip: clip.skeleton.up_axis or None,
+    "forward_axis": lambda clip: clip.skeleton.forward_axis or None,
+    "handedness": lambda clip: clip.skeleton.handedness or None,
+}
+
 
 MOST_NAMES = 8  # names that a message lists
 KEPT_CLIPS = 64

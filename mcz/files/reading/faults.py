@@ -22,7 +22,7 @@ from mcz.errors import (
 )
 from mcz.files.jobs import limit_jobs
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.fields import Where
+from mcz.files.reading.clips import Where
 from mcz.files.reading.file import File, open, open_bytes
 from mcz.files.reading.parallel_clips import share_clips
 from mcz.files.reading.signal_info import read_segments

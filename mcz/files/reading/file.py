@@ -29,8 +29,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.clips import Clips, list_some
-from mcz.files.reading.fields import Where, filter_clips
+from mcz.files.reading.clips import Clips, Where, filter_clips, list_some
 from mcz.files.reading.lost_skeletons import restore_skeletons
 from mcz.files.reading.source_info import sourced_skeleton
 from mcz.model.motion import Skeleton

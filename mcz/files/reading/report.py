@@ -18,7 +18,7 @@ from mcz.container.reader import Container
 from mcz.container.segments import GROUP_NOTES, GroupNotes
 from mcz.errors import FormatError, SkeletonWarning, UnsupportedError
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.fields import Where
+from mcz.files.reading.clips import Where
 from mcz.files.reading.file import File
 from mcz.files.reading.read import read_motion
 from mcz.files.reading.signal_info import SignalInfo

@@ -15,14 +15,18 @@ from mcz.codecs.known_answers import check_known_answer
 from mcz.container.decoded_cache import MOST_OF_ONE, Run
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable, parse_mask
-from mcz.errors import FormatError, MczError
-from mcz.files.reading.group_notes import (
+from mcz.container.segments import (
+    FRESH,
+    GROUP_NOTES,
+    MASKS,
     Noted,
     ParsedNotes,
+    StreamTable,
     parse_group_notes,
+    parse_mask,
     values_of_exceptions,
 )
+from mcz.errors import FormatError, MczError
 from mcz.files.reading.segment_salvage import salvage
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.kernels import lacks_compiled_kernels

@@ -16,7 +16,7 @@ from mcz.container.scan import scan
 from mcz.container.segments import StreamTable
 from mcz.errors import FormatError, UnsupportedError
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.fields import packet_framing
+from mcz.files.reading.clips import packet_framing
 from mcz.files.reading.file import File
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.model.schema import build

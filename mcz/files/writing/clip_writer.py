@@ -32,6 +32,7 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import SignalInfo, read_signal
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.files.reading.stored_clip import with_indices, with_names
+from mcz.files.writing.atomic import alias_once
 from mcz.files.writing.planning import (
     ClipPlan,
     Prepared,
@@ -42,7 +43,6 @@ from mcz.files.writing.planning import (
 )
 from mcz.files.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.files.writing.signal_source import MemorySource
-from mcz.files.writing.write_transaction import alias_once
 from mcz.model.motion import Motion, Signal, Skeleton
 from mcz.model.types import Params, Progress, Values
 from mcz.sources import FORMATS

@@ -19,13 +19,12 @@ from mcz.container.limits import profile_named
 from mcz.container.writer import Writer
 from mcz.errors import OptionError, SkeletonWarning
 from mcz.files.reading.source_files import SourceOptions
-from mcz.files.tables.files import table_of
-from mcz.files.tables.files import to_npz as npz_of
-from mcz.files.writing.atomic import refuse_inputs, replacing
+from mcz.files.tables import table_of
+from mcz.files.tables import to_npz as npz_of
+from mcz.files.writing.atomic import WriteTransaction, check_metadata, refuse_inputs, replacing
 from mcz.files.writing.planning import prepare, under_its_path, with_true_sources
 from mcz.files.writing.source_encoder import SourceEncoder, encoding_options
 from mcz.files.writing.tuning import write_motion
-from mcz.files.writing.write_transaction import WriteTransaction, check_metadata
 from mcz.model.motion import Motion
 from mcz.model.text_format import brief
 from mcz.model.threads import limit_threads

@@ -24,10 +24,10 @@ from mcz.files.reading.source_files import (
     read_skeleton,
 )
 from mcz.files.reading.source_info import stating_rate
+from mcz.files.writing.atomic import WriteTransaction, check_name, clip_name
 from mcz.files.writing.clip_writer import write_skeletons
 from mcz.files.writing.planning import StoredSkeleton, prepare, stored_with_base
 from mcz.files.writing.tuning import write_motion
-from mcz.files.writing.write_transaction import WriteTransaction, check_name, clip_name
 from mcz.hints import Hint, Remark
 from mcz.kinematics.rest_pose import height_note
 from mcz.model import threads

@@ -13,7 +13,7 @@ from typing import Protocol
 
 from mcz.container.source import ByteSource
 from mcz.errors import AccessError, MczError, reason_of
-from mcz.files.editing.safe_names import PortableNames
+from mcz.files.editing.folders import PortableNames
 from mcz.model.types import JsonObject, Params
 
 LONGEST_JSON = 2**16  # bytes that a request may post as JSON
