@@ -60,9 +60,8 @@ if TYPE_CHECKING:
     from mcz.files.editing.rewriting import protect
     from mcz.files.editing.unpacking import unpack
     from mcz.files.live.clip_state import LiveFrame
-    from mcz.files.live.generators import LiveReader, stream_decode, stream_encode
+    from mcz.files.live.generators import LiveReader, live_frames, stream_decode, stream_encode
     from mcz.files.live.reader_with_losses import StreamSummary
-    from mcz.files.live.strict_reader import live_frames
     from mcz.files.live.writer import LiveWriter
     from mcz.files.reading.clip import Clip
     from mcz.files.reading.faults import Problem, verify
@@ -164,7 +163,6 @@ _HOMES = {
     "mcz.files.writing.file": ("encode", "to_npz", "write"),
     "mcz.files.reading.post_filtering": ("post_filter",),
     "mcz.kinematics.marker_motion": ("in_positions",),
-    "mcz.files.live.strict_reader": ("live_frames",),
     "mcz.files.live.writer": ("LiveWriter",),
     "mcz.kinematics.poses": (
         "Root",
@@ -202,7 +200,7 @@ _HOMES = {
     "mcz.kinematics.retargeting.renaming": ("rename", "with_offsets"),
     "mcz.kinematics.retargeting.retargeting": ("retarget",),
     "mcz.kinematics.retargeting.selection": ("select",),
-    "mcz.files.live.generators": ("LiveReader", "stream_decode", "stream_encode"),
+    "mcz.files.live.generators": ("LiveReader", "live_frames", "stream_decode", "stream_encode"),
     "mcz.files.live.reader_with_losses": ("StreamSummary",),
     "mcz.show.viewing.view": ("View", "view"),
 }

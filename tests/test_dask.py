@@ -16,12 +16,8 @@ import pytest
 import mcz
 from mcz import MczError
 from mcz.files import dask
-from mcz.files.dask import cluster as clusters
-from mcz.files.dask import map_clips, packing
-from mcz.files.dask.packing import skeletons_beside
+from mcz.files.dask import map_clips, pack, skeletons_beside, verify
 from tests.commands import run
-
-pack, verify = packing.pack, dask.verify
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +173,7 @@ def test_a_cluster_packs_and_verifies(
 
 def slow(state: Any, ask: Any) -> Any:
     """Encode slowly, so that a worker can be killed in the middle."""
-    from mcz.files.dask.packing import encode_remotely
+    from mcz.files.dask import encode_remotely
 
     time.sleep(0.3)
     return encode_remotely(state, ask)
@@ -196,7 +192,7 @@ def test_a_worker_that_is_killed_takes_no_clip_along(
     for number in range(24):  # no two are the same
         (root / f"{number:02}.bvh").write_bytes(text + b"\n" * number)
     mcz.pack(root, tmp_path / "one.mcz")
-    monkeypatch.setattr(packing, "encode_remotely", slow)
+    monkeypatch.setattr(dask, "encode_remotely", slow)
     killed: list[int] = []
 
     def kill_one(done: int, total: int, what: str) -> None:
@@ -213,9 +209,9 @@ def test_a_worker_that_is_killed_takes_no_clip_along(
 
 
 def fatal(state: Any, ask: Any) -> Any:
-    if ask.name == "walk.c3d":
+    if ask.encoder.name == "walk.c3d":
         os._exit(1)
-    from mcz.files.dask.packing import encode_remotely
+    from mcz.files.dask import encode_remotely
 
     return encode_remotely(state, ask)
 
@@ -225,7 +221,7 @@ def fatal(state: Any, ask: Any) -> Any:
 def test_a_file_that_ends_its_workers_is_reported(
     cluster: Any, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(packing, "encode_remotely", fatal)
+    monkeypatch.setattr(dask, "encode_remotely", fatal)
     report = pack(folder, tmp_path / "all.mcz", cluster.scheduler_address)
     failed = {o.path: o.message for o in report.failures}
     assert set(failed) == {"walk.c3d", "more/broken.bvh"}
@@ -308,9 +304,9 @@ def test_what_machines_were_lost_with_is_asked_for_again() -> None:
 
     client = SimpleNamespace(submit=submit)
     wanted = 3
-    assert clusters.Task(client, "key", b"", 1).answer() == "fine"
+    assert dask.Task(client, "key", b"", 1).answer() == "fine"
     assert len(set(keys)) == 3
     keys.clear()
     wanted = 4
     with pytest.raises(MczError, match="the cluster is lost: timed out"):
-        clusters.Task(client, "key", b"", 1).answer()
+        dask.Task(client, "key", b"", 1).answer()

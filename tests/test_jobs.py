@@ -245,10 +245,10 @@ def test_a_file_whose_process_dies_is_reported(
     assert mcz.verify(tmp_path / "all.mcz") == []
 
 
-def dies_on_c3d(state: object, ask: coded_parts.PartRequest) -> coded_parts.Part:
+def dies_on_c3d(profile: Any, ask: Any) -> coded_parts.Part:
     if ask.path.name == "walk.c3d":
         raise mcz.WorkerError("it died")
-    return CODED(state, ask)
+    return CODED(profile, ask)
 
 
 CODED = coded_parts.encode_part

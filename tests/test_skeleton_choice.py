@@ -14,7 +14,7 @@ import pytest
 import mcz
 from mcz import SkeletonWarning, SourceError
 from mcz.files.reading.source_files import SourceOptions
-from mcz.files.writing.source_encoder import EncodingOptions
+from mcz.files.writing.file import EncodingOptions
 from tests.commands import Call
 from tests.live_codec import encode_live
 

@@ -113,7 +113,7 @@ def encode_lines(
     """Encode standard input frame by frame to ``target``; - or None is standard output."""
     from mcz.files.live.text_writer import begin_live
     from mcz.files.reading.source_files import SourceOptions
-    from mcz.files.writing.source_encoder import encoding_options
+    from mcz.files.writing.file import encoding_options
 
     options["profile"] = options["profile"] != "base"
     for name in ("verbatim", "profile", "copies", "effort"):

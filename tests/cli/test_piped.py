@@ -13,9 +13,9 @@ import pytest
 
 import mcz
 from mcz import live_frames
-from mcz.files.live.strict_reader import StrictFrames
+from mcz.files.live.generators import StrictFrames
 from mcz.files.reading.source_files import SourceOptions
-from mcz.files.writing.source_encoder import EncodingOptions
+from mcz.files.writing.file import EncodingOptions
 from mcz.sources import FORMATS
 from tests.commands import ENV, ROOT, Started
 from tests.live_codec import encode_live

@@ -32,11 +32,13 @@ from mcz.files.editing.merging import add_files
 from mcz.files.editing.metadata_edit import set_metadata
 from mcz.files.editing.reorganize import delete_clips
 from mcz.files.editing.unpacking import Content, stored_files
+from mcz.files.jobs import limit_jobs
 from mcz.files.reading.file import File, open
 from mcz.files.reading.source_files import SourceOptions, read_bytes
 from mcz.files.writing.atomic import WriteTransaction, check_name, refuse_inputs, replacing
-from mcz.files.writing.source_encoder import SourceEncoder, WritingOptions, encoding_options
+from mcz.files.writing.file import SourceEncoder, encoding_options
 from mcz.hints import split_hint
+from mcz.model.threads import limit_threads
 from mcz.model.types import Params, Progress, Target
 from mcz.sources import wants_skeleton
 
@@ -93,12 +95,16 @@ def pack(
         flat=True,
     )
     encoding = encoding_options(codec, effort, params)
-    writing = WritingOptions(force, profile_named(profile), copies, threads, jobs)
+    limits = profile_named(profile)
     named = [(path, path.relative_to(root).as_posix()) for path in paths]
     entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
     inputs = (*paths, *encoding.params.values())
-    with writing.in_force(), replacing(target, force=force, inputs=inputs) as stream:
-        transaction = WriteTransaction(stream, writing.profile, copies=writing.copies)
+    with (
+        limit_threads(threads),
+        limit_jobs(jobs),
+        replacing(target, force=force, inputs=inputs) as stream,
+    ):
+        transaction = WriteTransaction(stream, limits, copies=copies)
         report = _write_entries(transaction, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
         if mtimes:
@@ -182,13 +188,13 @@ def append(
         verbatim=verbatim,
     )
     encoding = encoding_options(codec, effort, params)
-    writing = WritingOptions(threads=threads, jobs=jobs)
     archives = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
     files = [source for source in sources if source not in archives]
     named, others = find_sources(files, root, target)
     entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
     with (
-        writing.in_force(),
+        limit_threads(threads),
+        limit_jobs(jobs),
         superseding(Path(target), named if replace else ()) as grown,
         growing(grown, salvage=salvage, force=force) as growth,
     ):

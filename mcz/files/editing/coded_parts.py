@@ -11,7 +11,6 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
@@ -23,53 +22,34 @@ from mcz.files.editing.unpacking import Content
 from mcz.files.jobs import DEFAULT_JOBS, Answer, answers, useful_jobs
 from mcz.files.reading.file import open
 from mcz.files.reading.parallel_clips import only_own
-from mcz.files.reading.source_files import SourceOptions
 from mcz.files.writing.atomic import WriteTransaction, check_name, clip_name
-from mcz.files.writing.source_encoder import EncodingOptions, SourceEncoder
+from mcz.files.writing.file import SourceEncoder
 from mcz.sources import wants_skeleton
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One encoded file: ``data`` is an MCZ file of it alone.
+    """One encoded file: ``data`` is an MCZ file of it alone, written by ``encoder``.
 
-    ``digest`` is the SHA-256 of the source file, the rest are attributes of ``SourceEncoder``.
+    ``digest`` is the SHA-256 of the source file, ``result`` that of ``SourceEncoder.write``.
     """
 
+    encoder: SourceEncoder
     digest: bytes
     data: bytes
     result: str
-    reason: str
-    remark: str
-    notes: tuple[str, ...]
-    inputs: tuple[Path, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class PartRequest:
-    """A file to encode, and the limits of the target."""
-
-    path: Path
-    name: str
-    options: SourceOptions
-    encoding: EncodingOptions
-    profile: Profile
-
-
-def request_of(entry: SourceEncoder, profile: Profile) -> PartRequest:
-    return PartRequest(entry.path, entry.name, entry.options, entry.encoding, profile)
-
-
-def encode_part(state: object, ask: PartRequest) -> Part:
-    """The part of a file; raises as ``SourceEncoder.write``."""
-    entry, sink = SourceEncoder(ask.path, ask.name, ask.options, ask.encoding), io.BytesIO()
-    transaction = WriteTransaction(sink, ask.profile)
-    result = entry.write(transaction)
+def encode_part(profile: Profile, asked: SourceEncoder) -> Part:
+    """The part of a file, within the limits of the target; raises as ``SourceEncoder.write``."""
+    encoder = SourceEncoder(asked.path, asked.name, asked.options, asked.encoding)
+    sink = io.BytesIO()
+    transaction = WriteTransaction(sink, profile)
+    result = encoder.write(transaction)
     transaction.finish()
-    digest = transaction.paths[ask.name]
+    digest = transaction.paths[asked.name]
     assert isinstance(digest, bytes)
-    inputs = tuple(entry.inputs)
-    return Part(digest, sink.getvalue(), result, entry.reason, entry.remark, entry.notes, inputs)
+    return Part(encoder, digest, sink.getvalue(), result)
 
 
 class EncodedPart(SourceEncoder):
@@ -86,9 +66,7 @@ class EncodedPart(SourceEncoder):
         """Write the file as ``SourceEncoder.write``; raises WorkerError if a process died."""
         part = self._part()
         if part is None or part.digest != self.digest():
-            return super().write(
-                transaction
-            )  # it fails, or has changed: errors as from one process
+            return super().write(transaction)  # it fails, or has changed: errors as of one process
         name = clip_name(self.name, transaction.writer.directory)
         if (
             self.can_be_read
@@ -101,8 +79,9 @@ class EncodedPart(SourceEncoder):
             return "present"
         with transaction.step():
             join_part(part, transaction, name)
-        self.reason, self.remark, self.notes = part.reason, part.remark, part.notes
-        self.inputs[:] = part.inputs
+        done = part.encoder
+        self.reason, self.remark, self.notes = done.reason, done.remark, done.notes
+        self.inputs[:] = done.inputs
         transaction.paths[self.name] = part.digest
         return part.result
 
@@ -151,7 +130,7 @@ def join_part(part: Part, transaction: WriteTransaction, clip: str) -> None:
 
 def request_parts(
     entries: Iterable[SourceEncoder], transaction: WriteTransaction, seen: Content
-) -> Iterator[PartRequest | None]:
+) -> Iterator[SourceEncoder | None]:
     """Yield the sources to encode ahead; None for one that may be stored already."""
     sent: set[bytes] = set()
     for entry in entries:
@@ -166,7 +145,7 @@ def request_parts(
             yield None
             continue
         sent.add(digest)
-        yield request_of(entry, transaction.writer.profile)
+        yield entry
 
 
 @contextmanager
@@ -178,7 +157,8 @@ def encode_ahead(
     if jobs == DEFAULT_JOBS or not only_own():
         yield iter(entries)
         return
-    with answers(encode_part, request_parts(entries, transaction, seen), jobs) as parts:
+    asked, profile = request_parts(entries, transaction, seen), transaction.writer.profile
+    with answers(encode_part, asked, jobs, profile) as parts:
         yield join_parts(entries, parts)
 
 

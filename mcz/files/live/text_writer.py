@@ -12,7 +12,7 @@ from mcz.files.live.writer import LiveWriter
 from mcz.files.reading.read import NONE
 from mcz.files.reading.read import NOTE as SKELETON_NOTE
 from mcz.files.reading.source_files import SourceOptions, read_skeleton
-from mcz.files.writing.source_encoder import EncodingOptions, rate_notes
+from mcz.files.writing.file import EncodingOptions, rate_notes
 from mcz.model.motion import Skeleton
 from mcz.model.types import Params
 from mcz.model.units import facing, in_unit
