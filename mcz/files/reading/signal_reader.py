@@ -79,10 +79,6 @@ class SignalReader:
             self._columns = [c for group in groups for c in layout.groups[group]]
             self._grids = tuple(layout.grids[c] for c in self._columns)
 
-    def read(self, start: int, stop: int) -> tuple[Values, NDArray[np.bool_] | None]:
-        """Values and mask of frames start <= f < stop, groups side by side."""
-        return self._read(start, stop, None)
-
     def signal(self, start: int, stop: int) -> Signal:
         """The same of all groups as a Signal, decoded once."""
         info = self.info
@@ -91,17 +87,17 @@ class SignalReader:
         binary = not info.is_integer and any(not grid.is_text for grid in grids)
         keep = binary and info.codec.domain == "ordinals" and not self.container.salvage
         ordinals = np.empty(self._shape(start, stop), np.int64) if keep else None
-        values, mask = self._read(start, stop, ordinals)
+        values, mask = self.read(start, stop, ordinals)
         per_frame = info.layout.samples_per_frame
         signal = Signal(values, info.grids, info.name, per_frame, mask, exceptions, changes)
         return replace(
             signal, channels=info.channels, ordinals=ordinals, role=info.role, of=info.of
         )
 
-    def _read(
-        self, start: int, stop: int, ordinals: NDArray[np.int64] | None
+    def read(
+        self, start: int, stop: int, ordinals: NDArray[np.int64] | None = None
     ) -> tuple[Values, NDArray[np.bool_] | None]:
-        """Values and mask; decoded ordinals are written to ``ordinals``."""
+        """Values and mask of frames start <= f < stop; ``ordinals`` gets decoded ordinals."""
         if self.container.salvage:
             return self._salvage(self._prepare(start, stop), start, stop)
         self._check_size(start, stop)
@@ -115,7 +111,7 @@ class SignalReader:
         stop: int,
         ordinals: NDArray[np.int64] | None = None,
     ) -> tuple[Values, NDArray[np.bool_] | None]:
-        """Values and mask of all blocks of the range; see ``_read``."""
+        """Values and mask of all blocks of the range; see ``read``."""
         kind = np.int64 if self.info.is_integer else np.float64
         values: Values = np.empty(self._shape(start, stop), kind)
         mask: NDArray[np.bool_] | None = None
