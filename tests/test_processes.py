@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.container.locks import lock
+from mcz.container.source import lock
 from mcz.files.writing.atomic import replacing
 from tests.commands import run
 from tests.motions import smooth

@@ -20,8 +20,7 @@ from mcz import codecs
 from mcz.container.checksums import ChecksumReport, check_checksums
 from mcz.container.chunks import FOOT, build_foot
 from mcz.container.index import index_content
-from mcz.container.locks import lock
-from mcz.container.source import open_source
+from mcz.container.source import lock, open_source
 from mcz.errors import UnsupportedError
 from tests import live_codec
 from tests.commands import Call

@@ -32,7 +32,7 @@ from tools.spec_traces import best, fast, posewave
 
 MODULES = (
     "mcz.container.payloads",
-    "mcz.container.index_records",
+    "mcz.container.directory",
     "mcz.container.segments",
     "mcz.container.copies",
     "mcz.container.metadata",

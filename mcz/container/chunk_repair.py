@@ -22,14 +22,15 @@ from mcz.container.chunks import (
     read_payload,
 )
 from mcz.container.copies import Copy, parse_copies
-from mcz.container.directory import Directory, Found, parse_head
+from mcz.container.directory import Directory
 from mcz.container.index_reader import Listed, directory_of, read_indexes
 from mcz.container.limits import BASE, index_limit
+from mcz.container.model_records import build_head, parse_head
 from mcz.container.packets import END
 from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
+from mcz.container.scanner import Found
 from mcz.container.source import ByteSource, Overlay
-from mcz.container.writer import build_head
 from mcz.errors import FormatError, MczError
 from mcz.model.schema import build
 

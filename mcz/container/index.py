@@ -10,10 +10,11 @@ from dataclasses import dataclass, field, fields
 from itertools import chain, islice
 from operator import attrgetter
 
-from mcz.container import index_records
 from mcz.container.chunks import FRAMING, Chunk, ChunkFlag, ChunkType, build_chunk
-from mcz.container.directory import ClipRow, Directory, IndexPlace, Packed, SignalRow
-from mcz.container.index_records import (
+from mcz.container.directory import (
+    CONTINUES,
+    ClipRow,
+    Directory,
     Index,
     IndexedAlias,
     IndexedAttachment,
@@ -22,6 +23,10 @@ from mcz.container.index_records import (
     IndexedPlace,
     IndexedSegment,
     IndexedSignal,
+    IndexPlace,
+    Indx,
+    Packed,
+    SignalRow,
 )
 from mcz.container.packets import FRAME, SEGMENT
 from mcz.container.segments import FRESH, KNOWN_FLAGS
@@ -48,9 +53,9 @@ def build_index(directory: Directory) -> bytes:
 
 def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
     """The INDX chunk of this content."""
-    record = index_records.Indx(size=len(content), data=deflate(content))
+    record = Indx(size=len(content), data=deflate(content))
     if since is not None:
-        record.flags, record.previous = index_records.CONTINUES, since.chunk
+        record.flags, record.previous = CONTINUES, since.chunk
     return build_chunk(ChunkType.INDX, build(record, "INDX"), ChunkFlag.ANCILLARY)
 
 

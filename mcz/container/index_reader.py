@@ -18,15 +18,19 @@ from mcz.container.directory import (
     ClipRow,
     ClipRows,
     Directory,
+    Index,
+    IndexedChunk,
+    IndexedPlace,
     IndexPlace,
+    Indx,
     Packed,
     PackedClipRow,
     Place,
+    PreviousIndex,
     SegmentRow,
     SignalRow,
 )
 from mcz.container.index import PACKETS, index_record
-from mcz.container.index_records import Index, IndexedChunk, IndexedPlace, Indx, PreviousIndex
 from mcz.container.limits import check
 from mcz.container.packets import FRAME
 from mcz.container.segments import FRESH, MASKS, SegmentHeader

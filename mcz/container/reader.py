@@ -30,17 +30,11 @@ from mcz.container.chunks import (
 from mcz.container.copies import Copy, copy_chunks, find_uncopied
 from mcz.container.decoded_cache import DecodedCache
 from mcz.container.dictionary_deflate import chunk_id, join_parts, plain_id, plain_payload
-from mcz.container.directory import (
-    AttachmentRow,
-    ClipRow,
-    Directory,
-    SegmentRow,
-    parse_clip,
-    parse_head,
-)
+from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.metadata import MetadataCache, Placed, Record, apply_records, read_records
+from mcz.container.model_records import parse_clip, parse_head, read_skeleton
 from mcz.container.packets import CHECK_SIZE, FRAME, MOST_HEAD, Packet, implied_by, is_packet
 from mcz.container.scan import scan
 from mcz.container.segments import (
@@ -52,7 +46,6 @@ from mcz.container.segments import (
     mask_of,
     parse_stream_table,
 )
-from mcz.container.skeletons import read_skeleton
 from mcz.container.source import ByteSource, Overlay
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.model.motion import Skeleton

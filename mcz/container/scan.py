@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from mcz.container.chunks import FOOT, FRAMING, REPEATED, Chunk, ChunkType, read_payload
 from mcz.container.dictionary_deflate import chunk_id
-from mcz.container.directory import Found, SegmentRow
+from mcz.container.directory import SegmentRow
 from mcz.container.grammar import (
     BODY,
     CLIP,
@@ -30,7 +30,7 @@ from mcz.container.grammar import (
 )
 from mcz.container.packets import END
 from mcz.container.parser_drivers import events, repeated_chunks
-from mcz.container.scanner import Scanner
+from mcz.container.scanner import Found, Scanner
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 

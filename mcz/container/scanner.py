@@ -6,22 +6,16 @@ SPEC.md, "Grammar" and "Strict reading", are normative.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from mcz.container import payloads, strict
 from mcz.container.chunks import HEADER, Chunk, ChunkType
 from mcz.container.dictionary_deflate import plain_id, plain_payload
-from mcz.container.directory import (
-    AttachmentRow,
-    ClipRow,
-    Found,
-    SegmentRow,
-    parse_clip,
-    parse_head,
-)
+from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow
 from mcz.container.grammar import NAMED, OTHER, ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.index_reader import IndexCheck
 from mcz.container.limits import check, index_limit
+from mcz.container.model_records import parse_clip, parse_head
 from mcz.container.packets import SEGMENT
 from mcz.container.parser import UNCHECKED, WHOLE, Parser
 from mcz.container.segments import GROUP_NOTES, parse_segment_header
@@ -32,6 +26,20 @@ from mcz.model.schema import parse
 PEEK = 64  # enough for the fields of a segment before its table
 
 Payloads = Callable[[Chunk], bytes]
+
+
+@dataclass(slots=True)
+class Found:
+    """The result of a scan."""
+
+    directory: Directory = field(default_factory=Directory)
+    chunks: list[Chunk] = field(default_factory=list)
+    feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
+    damage: list[str] = field(default_factory=list)
+    ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
+    # Parts that salvage could not use: offset, and the chunk if its header is sound.
+    broken: list[tuple[int, Chunk | None]] = field(default_factory=list)
+    doubts: bool = False  # it was not clear which clip something belongs to
 
 
 class Scanner:
@@ -254,4 +262,6 @@ class Scanner:
         if chunk.type == ChunkType.META and self.clip is not None:  # META-02
             raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
         size = chunk.offset + chunk.size if self._size is None else self._size
-        strict.check_ancillary(chunk, payload, size, self.found, self._payload_of)
+        strict.check_ancillary(
+            chunk, payload, size, self.found.directory, self.found.chunks, self._payload_of
+        )

@@ -6,17 +6,17 @@ Faults that only decoding shows are found where clips are decoded. SPEC.md, "Str
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.copies import check_copies, parse_copies
 from mcz.container.dictionary_deflate import is_packed
-from mcz.container.directory import Directory, Found
+from mcz.container.directory import Directory
 from mcz.container.limits import Profile
 from mcz.container.metadata import parse_meta
-from mcz.container.skeletons import parse_skeleton
+from mcz.container.model_records import parse_skeleton
 from mcz.errors import FormatError, LimitError
 from mcz.model.numbers import GridKind
 from mcz.model.schema import Record, parse
@@ -104,23 +104,25 @@ def check_ancillary(
     chunk: Chunk,
     payload: bytes,
     file_bytes: int,
-    found: Found,
+    directory: Directory,
+    before: Sequence[Chunk],
     payload_of: Callable[[Chunk], bytes] | None,
 ) -> None:
-    """Check ``chunk`` of a file of ``file_bytes``; ``found`` is before it. Raises FormatError.
+    """Check ``chunk`` of a file of ``file_bytes``, after ``directory`` and the chunks ``before``.
 
-    Without ``payload_of``, which reads earlier chunks again, copies are not compared with them.
+    Raises FormatError. Without ``payload_of``, which reads earlier chunks again, copies are not
+    compared with them.
     """
     if chunk.type == ChunkType.QUAL:
         parse(payloads.Qual, payload, chunk.label)  # QUAL-02
     elif chunk.type == ChunkType.META:
-        if not found.directory.clips:  # META-01
+        if not directory.clips:  # META-01
             raise FormatError(f"chunk {chunk.label} lies before the first clip")
         parse_meta(payload, chunk, file_bytes)
     elif chunk.type == ChunkType.COPY:
         copies = parse_copies(payload, chunk, file_bytes)
         if payload_of is not None:
-            check_copies(copies, chunk, found.chunks, payload_of)
+            check_copies(copies, chunk, before, payload_of)
 
 
 CODECS = {0, 1}  # raw and fast

@@ -28,6 +28,7 @@ from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRo
 from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
 from mcz.container.metadata import Record, build_metas
+from mcz.container.model_records import build_head
 from mcz.container.packets import CHECK_SIZE, END, FRAME, SEGMENT, Packet, build_packet, implied_by
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
 from mcz.container.strict import check_plain
@@ -41,11 +42,6 @@ ATTACHMENT_PART = MIB  # decoded bytes of one ATTA
 
 class Sink(Protocol):
     def write(self, data: bytes, /) -> int | None: ...
-
-
-def build_head(profile: Profile) -> bytes:
-    """The payload of a HEAD that this writer writes."""
-    return build(payloads.Head(profile=profile.id), "HEAD")
 
 
 UNINDEXED = 8192  # a shorter file is walked as fast as its index is read

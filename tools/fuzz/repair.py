@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from unittest import mock
 
 import mcz
-from mcz.container import index_records, payloads
+from mcz.container import payloads
 from mcz.container.chunks import (
     CRC,
     FOOT,
@@ -29,7 +29,7 @@ from mcz.container.chunks import (
     parse_foot,
     read_chunk,
 )
-from mcz.container.directory import Directory
+from mcz.container.directory import Directory, Indx
 from mcz.container.index import build_index
 from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet, implied_by
 from mcz.container.parser_drivers import packets
@@ -174,7 +174,7 @@ def _payload(data: bytes, chunk: Chunk) -> bytes:
 
 def changed_index(index: bytes, change: Callable[[bytes], bytes]) -> bytes:
     """The INDX chunk with its inflated content passed through ``change``."""
-    outer = parse(index_records.Indx, index[16 : -CRC.size], "INDX")
+    outer = parse(Indx, index[16 : -CRC.size], "INDX")
     content = change(inflate(outer.data, outer.size, "INDX"))
     outer.size, outer.data = len(content), deflate(content)
     return build_chunk(b"INDX", build(outer, "INDX"), ChunkFlag.ANCILLARY)

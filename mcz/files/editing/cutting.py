@@ -16,9 +16,9 @@ from mcz.container import payloads
 from mcz.container.dictionary_deflate import parse_skel
 from mcz.container.directory import SegmentRow
 from mcz.container.limits import Profile
+from mcz.container.model_records import put_time_base, time_base_of
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
-from mcz.container.time_base import put_time_base, time_base_of
 from mcz.errors import OptionError, error_context
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import SignalInfo

@@ -19,11 +19,11 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
-from mcz.container.locks import lock
 from mcz.container.metadata import Record
 from mcz.container.reader import Container
 from mcz.container.recovery import blocks
 from mcz.container.recovery.blocks import check_redundancy
+from mcz.container.source import lock
 from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
 from mcz.errors import AccessError, FormatError, OptionError, reason_of

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.dictionary_deflate import chunk_id
-from mcz.container.directory import parse_head
 from mcz.container.grammar import ChunkEvent, Fault, FootEvent, PacketEvent
 from mcz.container.limits import BASE, check
+from mcz.container.model_records import parse_head
 from mcz.container.parser_drivers import Stream, repeated_chunks
 from mcz.container.segments import FRESH, SegmentHeader, parse_segment_header
 from mcz.container.tolerant_parser import TolerantParser

@@ -20,8 +20,8 @@ from mcz.container.chunks import ChunkType
 from mcz.container.dictionary_deflate import chunk_id, pack_skeleton
 from mcz.container.directory import ClipRow
 from mcz.container.limits import check, check_decoded
+from mcz.container.model_records import build_skeleton
 from mcz.container.reader import Container
-from mcz.container.skeletons import build_skeleton
 from mcz.errors import MczError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import role_name

@@ -15,10 +15,10 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.limits import check
+from mcz.container.model_records import parse_channels
 from mcz.container.packets import FRAME
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
-from mcz.container.skeletons import parse_channels
 from mcz.errors import FormatError
 from mcz.model.clock import TIMES, times_signal_fault
 from mcz.model.identity import IdentityCache

@@ -17,8 +17,8 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.limits import check_decoded
+from mcz.container.model_records import numbers_of, whole_time_base
 from mcz.container.reader import Container
-from mcz.container.time_base import numbers_of, whole_time_base
 from mcz.errors import FormatError, OptionError, UnsupportedError
 from mcz.files.reading.signal_info import SignalInfo, check_roles, read_signal
 from mcz.files.reading.source_info import (

@@ -23,10 +23,9 @@ from mcz.container import payloads
 from mcz.container.copies import Copy
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
-from mcz.container.locks import is_abandoned, lock
 from mcz.container.metadata import KEYS, PRIVATE
 from mcz.container.scan import scan
-from mcz.container.source import ByteSource, file_system
+from mcz.container.source import ByteSource, file_system, is_abandoned, lock
 from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
 from mcz.errors import (

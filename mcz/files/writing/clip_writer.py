@@ -20,11 +20,10 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.dictionary_deflate import pack_skeleton
 from mcz.container.limits import Profile, check
+from mcz.container.model_records import build_skeleton, put_time_base, time_base_of
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
-from mcz.container.skeletons import build_skeleton
 from mcz.container.source import ByteSource, open_source
-from mcz.container.time_base import put_time_base, time_base_of
 from mcz.container.value_hash import ValueDigest, canonical
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, LimitError

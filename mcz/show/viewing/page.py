@@ -9,7 +9,7 @@ import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from mcz.container.locks import lock
+from mcz.container.source import lock
 from mcz.errors import AccessError, FormatError, reason_of
 from mcz.show.viewing.file_registry import Say
 

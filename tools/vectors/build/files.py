@@ -16,7 +16,7 @@ import numpy as np
 
 from mcz.codecs import raw
 from mcz.codecs.contract import Codec, Request, Span, model_finder
-from mcz.container import index_records, payloads
+from mcz.container import payloads
 from mcz.container.chunks import (
     HEADER,
     REPEATED,
@@ -28,7 +28,7 @@ from mcz.container.chunks import (
     build_foot,
     parse_chunk_header,
 )
-from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow
+from mcz.container.directory import CONTINUES, AttachmentRow, ClipRow, Index, Indx, SegmentRow
 from mcz.container.index import index_record
 from mcz.container.index_reader import index_name, place_of
 from mcz.container.limits import BASE, FORMAT_NAME, Profile
@@ -317,11 +317,11 @@ class Crafter(Writer):
         since = self.directory.indexes[-1] if self.directory.indexes else None
         fields = index_record(self.directory, since)
         self.apply_edit("table", fields)
-        content = build_record(index_records.Index, fields, "INDX")
+        content = build_record(Index, fields, "INDX")
         packed = {"size": len(content), "data": deflate(content)}
         if since is not None:
-            packed |= {"flags": index_records.CONTINUES, "previous": since.chunk}
-        payload = self.apply_edit("INDX", build_record(index_records.Indx, packed, "INDX"))
+            packed |= {"flags": CONTINUES, "previous": since.chunk}
+        payload = self.apply_edit("INDX", build_record(Indx, packed, "INDX"))
         return build_chunk(b"INDX", payload, ChunkFlag.ANCILLARY)
 
 

@@ -16,8 +16,8 @@ from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Encoded, Model, Segment, SignalSource
 from mcz.container import payloads
 from mcz.container.limits import BASE, LARGE
+from mcz.container.model_records import parse_skeleton
 from mcz.container.segments import SegmentHeader
-from mcz.container.skeletons import parse_skeleton
 from mcz.files.writing.clip_writer import ClipCopy, Decoded, write_plan
 from mcz.files.writing.planning import Prepared, SignalPlan, plan_clip
 from mcz.model.motion import Motion, Signal, Skeleton

@@ -13,9 +13,9 @@ from mcz.codecs.posewave.header import PosewaveHeader
 from mcz.codecs.spatial.lsdt_frame import FrameHeader
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.codecs.wavelet.wavelet import WaveletHeader
-from mcz.container import index_records, payloads, segments
+from mcz.container import payloads, segments
 from mcz.container.dictionary_deflate import decode_data, words
-from mcz.container.index_records import Index
+from mcz.container.directory import Index, Indx
 from mcz.model.schema import (
     Record,
     build,
@@ -46,7 +46,7 @@ SCHEMAS: dict[str, Any] = {
     "COPY": payloads.Copy,
     "META": payloads.Meta,
     "QUAL": payloads.Qual,
-    "INDX": index_records.Indx,
+    "INDX": Indx,
     "INDEX": Index,
 }
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
-from mcz.container import index_records, payloads
+from mcz.container import payloads
 from mcz.container.chunks import (
     CRC,
     FOOT,
@@ -23,10 +23,17 @@ from mcz.container.chunks import (
     build_foot,
     parse_chunk_header,
 )
-from mcz.container.directory import ClipRow, Directory, SegmentRow, signal_rows
+from mcz.container.directory import (
+    CONTINUES,
+    ClipRow,
+    Directory,
+    Indx,
+    PreviousIndex,
+    SegmentRow,
+    signal_rows,
+)
 from mcz.container.index import Listing, end_of, segment_rows
 from mcz.container.index_reader import ClipTables, directory_of, parse_index
-from mcz.container.index_records import PreviousIndex
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
@@ -349,10 +356,8 @@ def listing_of(part: Part, data: bytes) -> tuple[Listing, PreviousIndex | None]:
 
 
 def index_payload(content: bytes, previous: PreviousIndex | None) -> bytes:
-    flags = 0 if previous is None else index_records.CONTINUES
-    record = index_records.Indx(
-        flags=flags, previous=previous, size=len(content), data=deflate(content)
-    )
+    flags = 0 if previous is None else CONTINUES
+    record = Indx(flags=flags, previous=previous, size=len(content), data=deflate(content))
     return build(record, "INDX")
 
 

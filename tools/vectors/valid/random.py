@@ -18,9 +18,9 @@ import numpy as np
 from mcz.container import payloads
 from mcz.container.chunks import ChunkFlag, ChunkType
 from mcz.container.limits import BASE, FORMAT, LARGE
+from mcz.container.model_records import missing_runs
 from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet
 from mcz.container.segments import FRESH, SegmentHeader
-from mcz.container.time_base import missing_runs
 from mcz.container.value_hash import value_hash
 from mcz.files.writing.clip_writer import write_skeleton
 from mcz.model.motion import Motion
