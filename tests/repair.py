@@ -10,8 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 
 import mcz
-from mcz.container.chunks import FOOT, build_foot
-from mcz.container.packets import FRAME, Packet, build_packet, implied_by
+from mcz.container.chunks import FOOT, FRAME, Packet, build_foot, build_packet, implied_by
 from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
 from mcz.container.segments import mask_of, parse_segment_header

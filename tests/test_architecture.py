@@ -320,7 +320,7 @@ MOST_PARAMETERS = 8
 def test_functions_have_few_parameters() -> None:
     """But for public functions with keywords, commands of click, and kernels."""
     public = {(home.replace(".", "/"), name) for name, home in mcz._HOME_OF.items()}
-    public |= {("mcz/files/dask/packing", "pack"), ("mcz/exchange/datasets/member_list", "dataset")}
+    public |= {("mcz/files/dask", "pack"), ("mcz/exchange/datasets/member_list", "dataset")}
     public.add(("mcz/files/live/writer", "__init__"))
 
     def crowded(path: Path) -> list[str]:

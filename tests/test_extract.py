@@ -18,10 +18,10 @@ from mcz import codecs
 from mcz.codecs import raw
 from mcz.codecs.contract import Encoded
 from mcz.container import payloads
+from mcz.container.model_records import canonical
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH
 from mcz.container.source import open_source
-from mcz.container.value_hash import canonical
 from mcz.container.writer import Writer
 from mcz.files.reading.faults import validate
 from mcz.files.writing.clip_writer import write_clip

@@ -14,8 +14,8 @@ from hypothesis import given
 
 import mcz
 from mcz import Signal
+from mcz.container.model_records import canonical
 from mcz.container.scan import scan
-from mcz.container.value_hash import canonical
 from mcz.files.reading.faults import validate
 from mcz.files.reading.report import info
 from mcz.files.writing.atomic import METADATA_KEYS

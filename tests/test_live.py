@@ -23,13 +23,13 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
-from mcz.container.chunks import build_chunk
-from mcz.container.packets import (
+from mcz.container.chunks import (
     CHECK_SIZE,
     END,
     FRAME,
     SEGMENT,
     Packet,
+    build_chunk,
     build_packet,
 )
 from mcz.container.writer import Writer

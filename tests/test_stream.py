@@ -17,20 +17,18 @@ import mcz
 from mcz import codecs
 from mcz.container import limits, payloads
 from mcz.container.chunks import (
-    OPEN_LENGTH,
-    SIGNATURE,
-    ChunkFlag,
-    ChunkType,
-    build_chunk,
-    build_foot,
-    build_header,
-)
-from mcz.container.packets import (
     CHECK_SIZE,
     END,
     FRAME,
+    OPEN_LENGTH,
     SEGMENT,
+    SIGNATURE,
+    ChunkFlag,
+    ChunkType,
     Packet,
+    build_chunk,
+    build_foot,
+    build_header,
     build_packet,
     head_size,
     implied_by,

@@ -12,14 +12,13 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from mcz.container.chunks import Chunk, ChunkType
+from mcz.container.chunks import END, Chunk, ChunkType
 from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import ClipRow, Directory
 from mcz.container.grammar import INDEX, START, ChunkEvent, Event, Fault, PacketEvent
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import index_limit
 from mcz.container.model_records import parse_head
-from mcz.container.packets import END
 from mcz.container.parser import WHOLE, Parser
 from mcz.container.parser_drivers import events
 from mcz.container.source import ByteSource

@@ -12,6 +12,7 @@ from mcz.container import payloads
 from mcz.container.chunks import (
     COPIED,
     CRC,
+    END,
     FOOT,
     HEADER,
     Chunk,
@@ -26,7 +27,6 @@ from mcz.container.directory import Directory
 from mcz.container.index_reader import Listed, directory_of, read_indexes
 from mcz.container.limits import BASE, index_limit
 from mcz.container.model_records import build_head, parse_head
-from mcz.container.packets import END
 from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
 from mcz.container.scanner import Found

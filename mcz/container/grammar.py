@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mcz.container.chunks import FLAGS_OF, FOOT, HEADER, Chunk, ChunkFlag, ChunkType, Foot
-from mcz.container.packets import CHECK_SIZE, Packet, build_packet
+from mcz.container.chunks import (
+    CHECK_SIZE,
+    FLAGS_OF,
+    FOOT,
+    HEADER,
+    Chunk,
+    ChunkFlag,
+    ChunkType,
+    Foot,
+    Packet,
+    build_packet,
+)
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields
 from itertools import chain, islice
 from operator import attrgetter
 
-from mcz.container.chunks import FRAMING, Chunk, ChunkFlag, ChunkType, build_chunk
+from mcz.container.chunks import FRAME, FRAMING, SEGMENT, Chunk, ChunkFlag, ChunkType, build_chunk
 from mcz.container.directory import (
     CONTINUES,
     ClipRow,
@@ -28,7 +28,6 @@ from mcz.container.directory import (
     Packed,
     SignalRow,
 )
-from mcz.container.packets import FRAME, SEGMENT
 from mcz.container.segments import FRESH, KNOWN_FLAGS
 from mcz.errors import FormatError
 from mcz.model.schema import Table, build, deflate
@@ -48,14 +47,9 @@ def build_index(directory: Directory) -> bytes:
         if not kept or not (kept[-1].n_bytes < GROWTH * len(content) or len(kept) >= INDEXES):
             break
         kept.pop()
-    return index_chunk(content, kept[-1] if kept else None)
-
-
-def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
-    """The INDX chunk of this content."""
     record = Indx(size=len(content), data=deflate(content))
-    if since is not None:
-        record.flags, record.previous = CONTINUES, since.chunk
+    if kept:
+        record.flags, record.previous = CONTINUES, kept[-1].chunk
     return build_chunk(ChunkType.INDX, build(record, "INDX"), ChunkFlag.ANCILLARY)
 
 

@@ -12,7 +12,16 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from mcz.container.chunks import CRC, FRAMING, Chunk, ChunkFlag, ChunkType, build_chunk, check_chunk
+from mcz.container.chunks import (
+    CRC,
+    FRAME,
+    FRAMING,
+    Chunk,
+    ChunkFlag,
+    ChunkType,
+    build_chunk,
+    check_chunk,
+)
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -32,7 +41,6 @@ from mcz.container.directory import (
 )
 from mcz.container.index import PACKETS, index_record
 from mcz.container.limits import check
-from mcz.container.packets import FRAME
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.errors import FormatError
 from mcz.model.schema import MAX_COUNT, Table, build, inflate, parse
@@ -171,12 +179,14 @@ def _ends(sizes: Numbers, start: int) -> Numbers:
     return start + np.cumsum(sizes)
 
 
-def _chunks_of(table: Places, start: int, kind: bytes = ChunkType.ATTA) -> list[Chunk]:
+def _chunks_of(table: Places, start: int) -> list[Chunk]:
     """The chunks of a table with ``gap`` and ``length``, the first after ``start``."""
     lengths = table.numbers("length")
     ends = _ends(table.numbers("gap") + lengths + FRAMING, start)
     offsets = (ends - lengths - FRAMING).tolist()
-    return [Chunk(kind, 0, at, n) for at, n in zip(offsets, lengths.tolist(), strict=True)]
+    return [
+        Chunk(ChunkType.ATTA, 0, at, n) for at, n in zip(offsets, lengths.tolist(), strict=True)
+    ]
 
 
 class ClipTables:

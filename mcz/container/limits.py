@@ -14,7 +14,6 @@ from mcz.hints import Hint
 from mcz.model.schema import CheckedInRecord
 
 MIB = 2**20
-LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that a search may read in vain, in all
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,22 +107,14 @@ def metadata_limit(file_bytes: int) -> int:
     return max(64 * 1024, 2 * file_bytes)  # LIMIT-17
 
 
+def search_limit(file_bytes: int) -> int:
+    """The bytes that searches for the next intact chunk may read in vain, in all."""
+    return max(64 * MIB, 8 * file_bytes)
+
+
 def output_limit(file_bytes: int) -> int:
     """The bytes that a reader decodes from one file unless its caller allows more."""
     return max(64 * MIB, 4096 * file_bytes)  # LIMIT-10
-
-
-class Search:
-    """Budget of bytes that a search for the next intact chunk may read in vain."""
-
-    def __init__(self) -> None:
-        self.tried = 0
-
-    def spend(self, n_bytes: int, n_received: int, what: str) -> None:
-        """Count ``n_bytes`` as read; raises LimitError for too many."""
-        self.tried += n_bytes
-        if self.tried > max(LEAST_TRIED, TRIED_PER_BYTE * n_received):
-            raise LimitError(f"too many false starts of {what}; {self.tried} bytes read")
 
 
 FORMAT = 0, 99  # the draft of 1.0, which reads only itself

@@ -12,17 +12,27 @@ import zlib
 from collections.abc import Callable
 
 from mcz.container.chunks import (
+    CHECK_SIZE,
     CRC,
     END_MAGIC,
     FOOT,
+    FRAME,
     HEADER,
+    KIND,
+    SEGMENT,
     SIGNATURE,
     Chunk,
+    Packet,
     check_crc,
     check_signature_in,
+    implied_by,
+    packet_check,
     parse_chunk_header,
     parse_foot,
+    parse_packet_head,
 )
+from mcz.container.chunks import END as END_KIND
+from mcz.container.chunks import FRESH as FRESH_PACKET
 from mcz.container.grammar import (
     BODY,
     CLIP,
@@ -47,19 +57,7 @@ from mcz.container.grammar import (
     state_after_misplaced,
     thing_of,
 )
-from mcz.container.limits import BASE, Search
-from mcz.container.packets import (
-    CHECK_SIZE,
-    FRAME,
-    KIND,
-    SEGMENT,
-    Packet,
-    implied_by,
-    packet_check,
-    parse_packet_head,
-)
-from mcz.container.packets import END as END_KIND
-from mcz.container.packets import FRESH as FRESH_PACKET
+from mcz.container.limits import BASE, search_limit
 from mcz.container.segments import FRESH, MASKS, mask_of, parse_segment_header
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
 from mcz.model.schema import MAX_COUNT
@@ -120,7 +118,7 @@ class Parser:
         self._chunk = chunk  # the chunk at ``at``, or the open DATA around it
         self._parts: tuple[ChunkEvent, int] | None = None  # a chunk in parts, its crc up to now
         self._is_lost = False
-        self._vain = Search()
+        self._vain = 0  # bytes that searches have read
         self._tried = 0  # size of the last tried chunk
 
     @property
@@ -200,13 +198,13 @@ class Parser:
 
     def _spend(self, begin: int) -> Fault | None:
         """Count bytes searched in vain; return the last event if they are too many."""
-        try:
-            came = self._start + len(self._data) if self.size is None else self.size
-            self._vain.spend(self._tried + TRIAL_BYTES, came, "a chunk")  # LIVE-04
-        except LimitError as error:
-            self.is_done = True
-            return Fault(begin, error, is_lost=True)
-        return None
+        came = self._start + len(self._data) if self.size is None else self.size
+        self._vain += self._tried + TRIAL_BYTES
+        if self._vain <= search_limit(came):  # LIVE-04
+            return None
+        self.is_done = True
+        error = LimitError(f"too many false starts of a chunk; {self._vain} bytes read")
+        return Fault(begin, error, is_lost=True)
 
     def _go_to(self, at: int) -> None:
         self.at = at

@@ -1,6 +1,6 @@
 """The records of the chunks. SPEC.md has one table for each; a test compares them.
 
-DATA is bulk and parsed by hand in ``segments.py``, and in ``packets.py`` where it is open.
+DATA is bulk and parsed by hand in ``segments.py``, and in ``chunks.py`` where it is open.
 
 Readers ignore ``extension``: the end of a payload, or sized after flag bit 7. Rewriting keeps it.
 """

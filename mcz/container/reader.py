@@ -14,15 +14,21 @@ from weakref import finalize
 from mcz.container import payloads
 from mcz.container.chunk_repair import is_like, scan_for_salvage
 from mcz.container.chunks import (
+    CHECK_SIZE,
     FOOT,
+    FRAME,
     FRAMING,
+    MOST_HEAD,
     SIGNATURE,
     Chunk,
     ChunkType,
     Foot,
+    Packet,
     build_chunk,
     check_chunk,
     check_signature,
+    implied_by,
+    is_packet,
     parse_foot,
     read_chunk,
     read_payload,
@@ -35,7 +41,6 @@ from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.metadata import MetadataCache, Placed, Record, apply_records, read_records
 from mcz.container.model_records import parse_clip, parse_head, read_skeleton
-from mcz.container.packets import CHECK_SIZE, FRAME, MOST_HEAD, Packet, implied_by, is_packet
 from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,

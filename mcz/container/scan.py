@@ -1,7 +1,7 @@
 """The scan of a file: builds a Directory without, or in spite of, INDX.
 
 A strict scan raises at the first fault. A salvaging scan notes it, and continues with the next
-event; ``Bounds`` decides which clip a part after lost bytes belongs to. SPEC.md, "Grammar" and
+event; it leaves out parts after lost bytes that may belong to another clip. SPEC.md, "Grammar" and
 "Salvage", are normative.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from types import MappingProxyType
 
-from mcz.container.chunks import FOOT, FRAMING, REPEATED, Chunk, ChunkType, read_payload
+from mcz.container.chunks import END, FOOT, FRAMING, REPEATED, Chunk, ChunkType, read_payload
 from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import SegmentRow
 from mcz.container.grammar import (
@@ -28,7 +28,6 @@ from mcz.container.grammar import (
     FootEvent,
     PacketEvent,
 )
-from mcz.container.packets import END
 from mcz.container.parser_drivers import events, repeated_chunks
 from mcz.container.scanner import Found, Scanner
 from mcz.container.source import ByteSource
@@ -39,62 +38,10 @@ Owners = Mapping[tuple[int, int], str]  # offset and size of segments and CENDs 
 NOBODY: Owners = MappingProxyType({})
 
 
-class Bounds:
-    """Knowledge of the end of the open clip; ``owners``: the ones of an index.
-
-    ``doubt``: it may have ended, and another one begun, in lost bytes.
-    """
-
-    def __init__(self, owners: Owners) -> None:
-        self.owners = owners
-        self.doubt = False
-        self._fault: int | None = None  # start of the present unusable bytes
-
-    def begin(self) -> None:
-        """Note that a clip begins or ends here."""
-        self.doubt = False
-
-    def begin_fault(self, at: int) -> None:
-        """Note that the thing at ``at`` is unusable."""
-        self._fault = at if self._fault is None else self._fault
-
-    def skip(self, to: int) -> bool:
-        """Note that nothing is known up to ``to``; return whether there is a doubt."""
-        self.doubt = self.doubt or to - (self._fault or 0) >= LEAST_BETWEEN
-        return self.doubt
-
-    def is_sound(self) -> None:
-        """Note that the following thing was usable."""
-        self._fault = None
-
-    def settle(self, payload: bytes, offset: int, own: bytes) -> bool:
-        """Resolve the doubt by the REPT with ``payload``; return False if it is in another clip.
-
-        ``offset``: its place; ``own``: the payload of the CLIP that is open.
-        """
-        try:
-            chunks = repeated_chunks(payload, offset)
-        except FormatError:  # a bad REPT resolves nothing
-            return True
-        clips = [event.payload for event in chunks if event.chunk.type == ChunkType.CLIP]
-        self.doubt = clips != [own]
-        return not clips or clips == [own]
-
-    def check(self, clip: str, kind: str, offset: int, size: int) -> None:
-        """Raise FormatError for a part that may belong to another clip than ``clip``."""
-        owner = self.owners.get((offset, size))
-        if owner == clip:
-            self.doubt = False
-        elif owner is not None or self.doubt:  # SALV-10
-            raise FormatError(
-                f"{kind} at {offset} lies behind bytes that may have ended clip {clip!r}"
-            )
-
-
 def scan(
     source: ByteSource, *, salvage: bool = False, whole: bool = False, owners: Owners = NOBODY
 ) -> Found:
-    """Scan the file; ``owners``: see ``Bounds``.
+    """Scan the file; ``owners``: those of segments and CENDs in an index.
 
     ``whole`` also checks the crc of every chunk (salvage always does) and, unless salvaging, the
     contents of chunks and of INDX. Raises FormatError at the first fault unless ``salvage``; a
@@ -105,7 +52,7 @@ def scan(
         return read_payload(source, chunk, scanner.parser.profile.chunk_bytes)
 
     if salvage:
-        scanner: Scanner = Salvager(source.size, Bounds(owners))
+        scanner: Scanner = Salvager(source.size, owners)
     else:
         scanner = Scanner(source.size, whole=whole, payload_of=payload)
     try:
@@ -122,10 +69,12 @@ def scan(
 class Salvager(Scanner):
     """A salvaging scan: it notes faults, and uses what it can."""
 
-    def __init__(self, size: int, bounds: Bounds) -> None:
+    def __init__(self, size: int, owners: Owners) -> None:
         super().__init__(size)
         self.strict = False
-        self._bounds = bounds
+        self._owners = owners
+        self._doubt = False  # the open clip may have ended, and another begun, in lost bytes
+        self._fault: int | None = None  # start of the present unusable bytes
         self._opening = b""  # the payload of the CLIP that is open
         self._is_draining = False  # after a bad packet, later ones are skipped
         self._is_lost = False  # bytes before the next event are unknown
@@ -137,7 +86,8 @@ class Salvager(Scanner):
             if isinstance(event, Fault) and event.offset == self._size:
                 return
             if self.clip is not None:
-                self.found.doubts |= self._bounds.skip(event.offset)
+                self._doubt |= event.offset - (self._fault or 0) >= LEAST_BETWEEN
+                self.found.doubts |= self._doubt
         if self._is_draining:
             self._drain(event)
         else:
@@ -154,7 +104,7 @@ class Salvager(Scanner):
                 self._skip(event)
             else:
                 if not _is_inside(event):
-                    self._bounds.is_sound()
+                    self._fault = None
         if self.parser.state in (START, BODY, CLIP):
             self.parser.state = BODY if self.clip is None else CLIP
 
@@ -221,12 +171,12 @@ class Salvager(Scanner):
         elif chunk is not None and chunk.length is None:
             self._search(event.offset, event.offset)
         else:
-            self._bounds.begin_fault(event.offset)
+            self._fault = event.offset if self._fault is None else self._fault
             self._is_lost = fault is not None and fault.is_lost
 
     def _search(self, fault: int, at: int) -> None:
         """Search from ``at`` on for an intact thing; unusable bytes began at ``fault``."""
-        self._bounds.begin_fault(fault)
+        self._fault = fault if self._fault is None else self._fault
         self.parser.search(at)  # SALV-02
         self._is_lost = True
 
@@ -243,26 +193,35 @@ class Salvager(Scanner):
     # Salvaged parts, used in other ways ----------------------------------------
 
     def _begin_clip(self, chunk: Chunk, payload: bytes) -> None:
-        self._bounds.begin()
+        self._doubt = False
         super()._begin_clip(chunk, payload)
         self._opening = payload
 
     def _segment(self, row: SegmentRow) -> None:
-        assert self.clip is not None
-        self._bounds.check(self.clip.name, "DATA", row.offset, row.size)
+        self._check_owner("DATA", row.offset, row.size)
         super()._segment(row)
 
     def _may_follow(self, first: int, due: int) -> bool:
         return first >= due
 
     def _end_clip(self, chunk: Chunk, payload: bytes) -> None:
-        assert self.clip is not None
-        self._bounds.check(self.clip.name, "CEND", chunk.offset, chunk.size)
+        self._check_owner("CEND", chunk.offset, chunk.size)
         super()._end_clip(chunk, payload)
+
+    def _check_owner(self, kind: str, offset: int, size: int) -> None:
+        """Raise FormatError for a part that may belong to another clip than the open one."""
+        assert self.clip is not None
+        owner = self._owners.get((offset, size))
+        if owner == self.clip.name:
+            self._doubt = False
+        elif owner is not None or self._doubt:  # SALV-10
+            raise FormatError(
+                f"{kind} at {offset} lies behind bytes that may have ended clip {self.clip.name!r}"
+            )
 
     def _close_clip(self) -> list[FormatError]:
         clip = self.clip
-        self._bounds.begin()
+        self._doubt = False
         if clip is not None:
             if clip.cend is None:
                 clip.damage.append(f"clip {clip.name!r} has no CEND")
@@ -278,8 +237,7 @@ class Salvager(Scanner):
     def _repeat(self, chunk: Chunk, payload: bytes) -> None:
         """Use the chunks of a REPT: of the open clip, those that may have been lost."""
         directory = self.found.directory
-        own = b"" if self.clip is None else self._opening
-        if self._bounds.doubt and not self._bounds.settle(payload, chunk.offset, own):
+        if self._doubt and not self._settle_doubt(payload, chunk.offset):
             self._close_clip()
         if self.clip is None:
             for inner in repeated_chunks(payload, chunk.payload_offset):
@@ -292,6 +250,17 @@ class Salvager(Scanner):
                         kind = inner.chunk.type
                         key = kind, chunk_id(kind, inner.payload)
                         directory.shared.setdefault(key, inner.chunk)
+
+    def _settle_doubt(self, payload: bytes, offset: int) -> bool:
+        """Settle it by a REPT with ``payload`` at ``offset``; False if that is in another clip."""
+        try:
+            chunks = repeated_chunks(payload, offset)
+        except FormatError:  # a bad REPT settles nothing
+            return True
+        clips = [event.payload for event in chunks if event.chunk.type == ChunkType.CLIP]
+        own = b"" if self.clip is None else self._opening
+        self._doubt = clips != [own]
+        return not clips or not self._doubt
 
     def finish(self) -> None:
         self._close_clip()

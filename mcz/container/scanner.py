@@ -9,14 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from mcz.container import payloads, strict
-from mcz.container.chunks import HEADER, Chunk, ChunkType
+from mcz.container.chunks import HEADER, SEGMENT, Chunk, ChunkType
 from mcz.container.dictionary_deflate import plain_id, plain_payload
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow
 from mcz.container.grammar import NAMED, OTHER, ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.index_reader import IndexCheck
 from mcz.container.limits import check, index_limit
 from mcz.container.model_records import parse_clip, parse_head
-from mcz.container.packets import SEGMENT
 from mcz.container.parser import UNCHECKED, WHOLE, Parser
 from mcz.container.segments import GROUP_NOTES, parse_segment_header
 from mcz.container.strict import check_plain

@@ -266,19 +266,13 @@ class Overlay(ByteSource):
 
 
 class Forward:
-    """Reads on from offset ``at`` of a source, a block at a time, for many small parts."""
+    """Reads many small parts of a source front to back, a block at a time."""
 
-    def __init__(self, source: ByteSource, at: int) -> None:
-        self.at = at
+    def __init__(self, source: ByteSource) -> None:
         self._source = source
-        self._start, self._block = at, b""
+        self._start, self._block = 0, b""
 
-    def __call__(self, size: int) -> bytes:
-        """The next ``size`` bytes; raises TruncatedError if the file ends before."""
-        self.at += size
-        return self.at_offset(self.at - size, size)
-
-    def at_offset(self, offset: int, size: int) -> bytes:
+    def read(self, offset: int, size: int) -> bytes:
         """The ``size`` bytes at an offset that is not before the last ones read."""
         first = offset - self._start
         if first + size > len(self._block):

@@ -9,10 +9,9 @@ import re
 import zlib
 from itertools import chain
 
-from mcz.container.chunks import END_MAGIC, FOOT, REPEATED, Chunk, ChunkType, Foot
+from mcz.container.chunks import END_MAGIC, FOOT, FRAME, REPEATED, Chunk, ChunkType, Foot
 from mcz.container.grammar import CLIP, FILE, PACKETS, ChunkEvent, Event, Fault, FootEvent
 from mcz.container.limits import BASE, MIB, check
-from mcz.container.packets import FRAME
 from mcz.container.parser import WHOLE, Parser, Short
 from mcz.errors import FormatError
 

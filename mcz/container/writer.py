@@ -12,15 +12,22 @@ from typing import Protocol
 
 from mcz.container import payloads
 from mcz.container.chunks import (
+    CHECK_SIZE,
     COPIED,
+    END,
+    FRAME,
     OPEN_LENGTH,
+    SEGMENT,
     SIGNATURE,
     Chunk,
     ChunkFlag,
     ChunkType,
+    Packet,
     build_chunk,
     build_foot,
     build_header,
+    build_packet,
+    implied_by,
 )
 from mcz.container.copies import Copy, build_copies, group_copies, is_worth_copying
 from mcz.container.dictionary_deflate import chunk_id, encode_smallest, plain_id
@@ -29,7 +36,6 @@ from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
 from mcz.container.metadata import Record, build_metas
 from mcz.container.model_records import build_head
-from mcz.container.packets import CHECK_SIZE, END, FRAME, SEGMENT, Packet, build_packet, implied_by
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
 from mcz.container.strict import check_plain
 from mcz.errors import FormatError, MotionError

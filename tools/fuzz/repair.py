@@ -18,25 +18,30 @@ import mcz
 from mcz.container import payloads
 from mcz.container.chunks import (
     CRC,
+    END,
     FOOT,
+    FRAME,
     OPEN_LENGTH,
+    SEGMENT,
     SIGNATURE,
     Chunk,
     ChunkFlag,
+    Packet,
     build_chunk,
     build_foot,
     build_header,
+    build_packet,
+    implied_by,
     parse_foot,
     read_chunk,
 )
 from mcz.container.directory import Directory, Indx
 from mcz.container.index import build_index
-from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet, implied_by
+from mcz.container.model_records import value_hash
 from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
 from mcz.container.segments import SegmentHeader, mask_of, parse_segment_header
 from mcz.container.source import open_source
-from mcz.container.value_hash import value_hash
 from mcz.errors import FormatError, MczError
 from mcz.files.reading.clip import Clip
 from mcz.model.schema import build, deflate, inflate, parse, read_varint, varint

@@ -58,10 +58,10 @@ def divide(a: int, b: int) -> int:
     return int(exp[(log[a] - log[b]) % ORDER])
 
 
-def log_of_product(values: Ints, axis: int = 0) -> Ints:
-    """Logarithms of the products of elements other than 0 along an axis."""
+def log_of_product(values: Ints) -> Ints:
+    """Logarithms of the products of elements other than 0 along the first axis."""
     _, log = logarithms()
-    return np.asarray(log[values].sum(axis) % ORDER)
+    return np.asarray(log[values].sum(0) % ORDER)
 
 
 @cache

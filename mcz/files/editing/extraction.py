@@ -15,8 +15,8 @@ from typing import BinaryIO
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.model_records import ValueDigest, value_hash
 from mcz.container.segments import SegmentHeader
-from mcz.container.value_hash import ValueDigest, value_hash
 from mcz.errors import FormatError, MotionError, OptionError
 from mcz.files.editing.chunk_copier import ChunkCopier, metadata_records
 from mcz.files.editing.cutting import (

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
+from mcz.container.model_records import value_hash
 from mcz.container.segments import GROUP_NOTES, MASKS, GroupNotes, SegmentHeader
-from mcz.container.value_hash import value_hash
 from mcz.files.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
 from mcz.files.editing.extraction import Copier, Copying
 from mcz.files.editing.recoding import (

@@ -61,11 +61,11 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
 
 def _clip_sources(container: Container) -> Iterator[tuple[str, str, bytes]]:
     """Name, path and digest of each clip with a source; without rows of the directory."""
-    read = Forward(container.source, 0)
+    read = Forward(container.source).read
     for name, at, size, cend_at, cend_size in container.directory.clips.places():
         if not cend_size:
             continue
-        clip, cend = read.at_offset(at, size), read.at_offset(cend_at, cend_size)
+        clip, cend = read(at, size), read(cend_at, cend_size)
         with suppress(FormatError, IndexError, UnicodeDecodeError):
             path, digest = _parse_path(_check_chunk(clip)), _parse_digest(_check_chunk(cend))
             if path is not None and digest:

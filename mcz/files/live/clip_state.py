@@ -20,9 +20,9 @@ from mcz.codecs import codec_by_id
 from mcz.codecs.contract import LiveDecoder
 from mcz.codecs.known_answers import check_known_answer
 from mcz.container import payloads
-from mcz.container.chunks import SIGNATURE, Chunk, ChunkType, build_foot
+from mcz.container.chunks import FRAME, SIGNATURE, Chunk, ChunkType, build_foot
 from mcz.container.directory import ClipRow
-from mcz.container.packets import FRAME
+from mcz.container.model_records import ValueDigest
 from mcz.container.reader import Container
 from mcz.container.segments import (
     FRESH,
@@ -33,7 +33,6 @@ from mcz.container.segments import (
     parse_stream_table,
 )
 from mcz.container.source import ByteSource
-from mcz.container.value_hash import ValueDigest
 from mcz.errors import ChecksumError, FormatError, LostFrameError, TruncatedError, UnsupportedError
 from mcz.files.reading.signal_info import SignalInfo, check_roles, read_signal
 from mcz.model.motion import Skeleton

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
 from mcz.container.chunks import REPEATED, ChunkFlag, ChunkType
-from mcz.container.model_records import MissingRunCounter
+from mcz.container.model_records import MissingRunCounter, ValueDigest
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_mask
-from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
 from mcz.files.reading.stored_clip import with_indices

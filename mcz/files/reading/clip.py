@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from mcz.container.limits import check_decoded
+from mcz.container.model_records import ValueDigest, value_hash
 from mcz.container.reader import Container
-from mcz.container.value_hash import ValueDigest, value_hash
 from mcz.errors import ChecksumError, FormatError, OptionError
 from mcz.files.reading.signal_info import SignalInfo, groups_of
 from mcz.files.reading.signal_reader import SignalReader

@@ -16,10 +16,9 @@ from weakref import WeakValueDictionary
 
 from mcz.codecs import codec_by_id
 from mcz.container import payloads
-from mcz.container.chunks import FRAMING, HEADER, ChunkType
+from mcz.container.chunks import CHECK_SIZE, FRAMING, HEADER, ChunkType, head_size
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.metadata import SETTABLE, SPELLINGS, Record
-from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.container.reader import Container
 from mcz.errors import FormatError, OptionError, UnknownNameError, UnsupportedError
 from mcz.files.reading.clip import Clip

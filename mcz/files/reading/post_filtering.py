@@ -6,7 +6,7 @@ values. SPEC.md, "Post filter", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -44,14 +44,20 @@ def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
     first = motion.signals[0]
     _check_markers(motion.name, motion.skeleton, first.channels is not None)
     settings = _settings(motion.name, motion.skeleton, motion.frame_rate, first.samples_per_frame)
+    return _with_positions(motion, _filter(first.values, first.mask, *settings))
+
+
+def _with_positions(motion: Motion, values: Values) -> Motion:
+    """``motion`` with filtered positions, which lie on no grid, a note on them, and no source."""
+    first, notes = motion.signals[0], motion.metadata.get("source-note")
     signal = Signal(
-        _filter(first.values, first.mask, *settings),
-        name=first.name,
-        samples_per_frame=first.samples_per_frame,
-        mask=first.mask,
+        values, name=first.name, samples_per_frame=first.samples_per_frame, mask=first.mask
     )
+    metadata = {"source-note": SEPARATOR.join(filter(None, (notes, NOTE)))}
     filtered = replace(
-        motion, signals=(signal, *motion.signals[1:]), metadata=_with_note(motion.metadata)
+        motion,
+        signals=(signal, *motion.signals[1:]),
+        metadata=dict(motion.metadata) | metadata,
     )
     return filtered.without_source()
 
@@ -97,14 +103,8 @@ def filtered_motion(
     rate: Fraction | None = None,
 ) -> Motion:
     """As ``clip.motion``, without a source: the whole clip is filtered, then the part cut out."""
-    motion = _filtered_on_grids(clip, frames, resolution, decimate, rate).without_source()
-    first = motion.signals[0]
-    signal = Signal(
-        first.values, name=first.name, samples_per_frame=first.samples_per_frame, mask=first.mask
-    )
-    return replace(
-        motion, signals=(signal, *motion.signals[1:]), metadata=_with_note(motion.metadata)
-    )
+    motion = _filtered_on_grids(clip, frames, resolution, decimate, rate)
+    return _with_positions(motion, motion.signals[0].values)
 
 
 def filtered_source(
@@ -185,8 +185,3 @@ def _filter(values: Values, mask: Bools | None, rate: float, unit_cm: float) -> 
         return filter_rows(rows, rate, unit_cm)
     # FILT-05, FILT-06
     return np.where(mask, filter_rows(np.where(mask, rows, np.nan), rate, unit_cm), rows)
-
-
-def _with_note(metadata: Mapping[str, str]) -> dict[str, str]:
-    notes = [note for note in (metadata.get("source-note"), NOTE) if note]
-    return dict(metadata) | {"source-note": SEPARATOR.join(notes)}

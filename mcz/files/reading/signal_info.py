@@ -12,11 +12,10 @@ from typing import Any
 from mcz.codecs import CODECS, codec_by_id
 from mcz.codecs.contract import Codec, Layout, Model, Span
 from mcz.container import payloads
-from mcz.container.chunks import ChunkType
+from mcz.container.chunks import FRAME, ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.limits import check
 from mcz.container.model_records import parse_channels
-from mcz.container.packets import FRAME
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
 from mcz.errors import FormatError
@@ -117,7 +116,7 @@ def read_signal(
     own = fields.signals[index]
     channels = None
     if own.flags & payloads.OWN_CHANNELS:
-        channels = parse_channels(own.channels, where)
+        channels = parse_channels(own.channels)
     coded: Skeleton | None = skeleton
     if channels is not None:  # CLIP-09, PWAVE-04
         coded = None

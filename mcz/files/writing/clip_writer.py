@@ -20,11 +20,16 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.dictionary_deflate import pack_skeleton
 from mcz.container.limits import Profile, check
-from mcz.container.model_records import build_skeleton, put_time_base, time_base_of
+from mcz.container.model_records import (
+    ValueDigest,
+    build_skeleton,
+    canonical,
+    put_time_base,
+    time_base_of,
+)
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.source import ByteSource, open_source
-from mcz.container.value_hash import ValueDigest, canonical
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, LimitError
 from mcz.files.reading.clip import Clip

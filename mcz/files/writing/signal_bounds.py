@@ -50,7 +50,9 @@ def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, d
     Also returns entries of the quality record. Raises OptionError for a bad bound.
     """
     asked = {key: value for key, value in params.items() if _is_bound(key)}
-    if asked and codec.lossless:
+    if not asked:
+        return motion, {}
+    if codec.lossless:
         raise OptionError(
             f"{next(iter(asked))}: codec {codec.name} promises the source byte for byte; name a "
             "lossy codec, whose parameter lossless=all keeps the motion exact"

@@ -18,31 +18,29 @@ from mcz.codecs import raw
 from mcz.codecs.contract import Codec, Request, Span, model_finder
 from mcz.container import payloads
 from mcz.container.chunks import (
+    CHECK_SIZE,
+    END,
+    FRAME,
     HEADER,
     REPEATED,
+    SEGMENT,
     SIGNATURE,
     Chunk,
     ChunkFlag,
     ChunkType,
+    Packet,
     build_chunk,
     build_foot,
+    build_packet,
+    implied_by,
     parse_chunk_header,
 )
 from mcz.container.directory import CONTINUES, AttachmentRow, ClipRow, Index, Indx, SegmentRow
 from mcz.container.index import index_record
 from mcz.container.index_reader import index_name, place_of
 from mcz.container.limits import BASE, FORMAT_NAME, Profile
-from mcz.container.packets import (
-    CHECK_SIZE,
-    END,
-    FRAME,
-    SEGMENT,
-    Packet,
-    build_packet,
-    implied_by,
-)
+from mcz.container.model_records import canonical, value_hash
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
-from mcz.container.value_hash import canonical, value_hash
 from mcz.container.writer import Writer
 from mcz.files.writing.clip_writer import ClipCopy, Decoded, write_plan
 from mcz.files.writing.planning import Prepared, SignalPlan, plan_clip

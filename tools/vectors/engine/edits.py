@@ -11,9 +11,8 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from mcz.container.chunks import Chunk, ChunkFlag
+from mcz.container.chunks import Chunk, ChunkFlag, implied_by
 from mcz.container.directory import Index
-from mcz.container.packets import implied_by
 from mcz.model.schema import build, read_varint, varint
 from tools.vectors.engine.fields import SCHEMAS, STREAMS, VIEWS, place_of, swap_items
 from tools.vectors.engine.layout import (

@@ -14,13 +14,21 @@ from dataclasses import dataclass, field, replace
 
 from mcz.container import payloads
 from mcz.container.chunks import (
+    CHECK_SIZE,
     CRC,
+    END,
     FOOT,
+    FRAME,
     FRAMING,
     HEADER,
+    SEGMENT,
     SIGNATURE,
     Chunk,
+    Packet,
     build_foot,
+    build_packet,
+    implied_by,
+    packet_check,
     parse_chunk_header,
 )
 from mcz.container.directory import (
@@ -34,16 +42,6 @@ from mcz.container.directory import (
 )
 from mcz.container.index import Listing, end_of, segment_rows
 from mcz.container.index_reader import ClipTables, directory_of, parse_index
-from mcz.container.packets import (
-    CHECK_SIZE,
-    END,
-    FRAME,
-    SEGMENT,
-    Packet,
-    build_packet,
-    implied_by,
-    packet_check,
-)
 from mcz.container.parser_drivers import packets
 from mcz.container.segments import SegmentHeader, build_segment, mask_of, parse_segment_header
 from mcz.container.source import open_source

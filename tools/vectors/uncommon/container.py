@@ -15,8 +15,7 @@ from mcz.codecs import raw
 from mcz.codecs.basis_models import build_model
 from mcz.codecs.contract import model_id
 from mcz.container import payloads
-from mcz.container.chunks import ChunkFlag, build_foot
-from mcz.container.packets import END, Packet, build_packet
+from mcz.container.chunks import END, ChunkFlag, Packet, build_foot, build_packet
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.schema import inflate, parse

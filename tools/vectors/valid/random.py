@@ -16,12 +16,10 @@ from typing import Any
 import numpy as np
 
 from mcz.container import payloads
-from mcz.container.chunks import ChunkFlag, ChunkType
+from mcz.container.chunks import END, FRAME, SEGMENT, ChunkFlag, ChunkType, Packet, build_packet
 from mcz.container.limits import BASE, FORMAT, LARGE
-from mcz.container.model_records import missing_runs
-from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet
+from mcz.container.model_records import missing_runs, value_hash
 from mcz.container.segments import FRESH, SegmentHeader
-from mcz.container.value_hash import value_hash
 from mcz.files.writing.clip_writer import write_skeleton
 from mcz.model.motion import Motion
 from mcz.model.schema import build, deflate, parse, varint
