@@ -221,7 +221,7 @@ def test_metadata_of_clips_are_read_once(archive: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setattr("mcz.container.metadata.parse_until", count_parse)
     for most in (2**20, 0):  # bytes that are kept
-        monkeypatch.setattr("mcz.container.metadata.MOST_KEPT", most)
+        monkeypatch.setattr("mcz.container.caches.MOST_KEPT", most)
         calls.clear()
         with mcz.open(archive) as file:
             for _ in range(2):

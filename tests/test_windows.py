@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import ChecksumError, Signal
-from mcz.container.decoded_cache import MOST_BYTES, DecodedCache, Run
+from mcz.container.caches import MOST_BYTES, DecodedCache, Run
 from mcz.container.segments import FRESH
 from tests.motions import smooth, write_bytes
 

@@ -9,19 +9,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime
-from sys import intern
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
 from mcz.container.dictionary_deflate import decode_data, encode_smallest
-from mcz.container.directory import ClipRow
 from mcz.container.limits import BASE, MIB, Profile, check, metadata_limit
 from mcz.errors import FormatError, OptionError
-from mcz.model.schema import build, parse, parse_all, parse_until
+from mcz.model.schema import build, parse, parse_all
 from mcz.model.text_format import nearest
-
-MOST_KEPT = 16 * MIB  # bytes, about: 40,000 clips of three keys
-PAIR = 100  # bytes of a pair in Python, without its letters
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,25 +32,6 @@ class Record:
 
 
 Placed = dict[str, list[tuple[int, Record]]]  # by name, each with the offset of its META
-
-
-class MetadataCache:
-    """Cache of the metadata in CLIPs, up to ``MOST_KEPT``."""
-
-    def __init__(self) -> None:
-        self._pairs: dict[str, dict[str, str]] = {}
-        self._size = 0
-
-    def of(self, row: ClipRow, payload: Callable[[Chunk], bytes]) -> Mapping[str, str]:
-        """Return the metadata in the CLIP of ``row``, whose payload is read unless cached."""
-        pairs = self._pairs.get(row.name)
-        if pairs is None:
-            clip = parse_until(payloads.Clip, payload(row.clip), row.clip.label, "source")
-            pairs = {intern(pair.key): pair.value for pair in clip.metadata}
-            self._size += PAIR + sum(PAIR + len(key) + len(pairs[key]) for key in pairs)
-            if self._size <= MOST_KEPT:
-                self._pairs[row.name] = pairs
-        return pairs
 
 
 def apply_records(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, str]:

@@ -12,6 +12,7 @@ from operator import attrgetter
 from weakref import finalize
 
 from mcz.container import payloads
+from mcz.container.caches import DecodedCache, MetadataCache
 from mcz.container.chunk_repair import is_like, scan_for_salvage
 from mcz.container.chunks import (
     CHECK_SIZE,
@@ -34,12 +35,11 @@ from mcz.container.chunks import (
     read_payload,
 )
 from mcz.container.copies import Copy, copy_chunks, find_uncopied
-from mcz.container.decoded_cache import DecodedCache
 from mcz.container.dictionary_deflate import chunk_id, join_parts, plain_id, plain_payload
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
-from mcz.container.metadata import MetadataCache, Placed, Record, apply_records, read_records
+from mcz.container.metadata import Placed, Record, apply_records, read_records
 from mcz.container.model_records import parse_clip, parse_head, read_skeleton
 from mcz.container.scan import scan
 from mcz.container.segments import (

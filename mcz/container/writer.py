@@ -298,9 +298,10 @@ class Writer:
     def finish(self, *, index: bool = True) -> None:
         """Write the requested copies, INDX, unless disabled, and FOOT."""
         self._between_clips("FOOT")
-        copies = (copy for copy in self._copies or () if is_worth_copying(copy, self.offset))
-        for run in group_copies(copies):
-            self.ancillary(ChunkType.COPY, build_copies(run, self.offset), safe_to_copy=False)
+        if self._copies:
+            copies = (copy for copy in self._copies if is_worth_copying(copy, self.offset))
+            for run in group_copies(copies):
+                self.ancillary(ChunkType.COPY, build_copies(run, self.offset), safe_to_copy=False)
         start, length = 0, 0
         if index and not (self.profile.is_plain or (self.short and self.offset <= UNINDEXED)):
             chunk = build_index(self.directory)

@@ -15,7 +15,7 @@ import mcz
 from mcz.codecs.coding.forms.counts import Law
 from mcz.codecs.coding.forms.products import DEGREE, of_products
 from mcz.codecs.coding.forms.units import of_multiples
-from mcz.container.decoded_cache import DecodedCache
+from mcz.container.caches import DecodedCache
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources import FORMATS

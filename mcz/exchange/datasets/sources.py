@@ -13,7 +13,7 @@ from weakref import finalize
 
 import numpy as np
 
-from mcz.container.decoded_cache import DecodedCache, SharedCache
+from mcz.container.caches import DecodedCache, SharedCache
 from mcz.errors import OptionError
 from mcz.exchange.datasets.caches import Arrays
 from mcz.exchange.datasets.field_table import SIGNAL, chosen_fields

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Request, Span
 from mcz.codecs.known_answers import check_known_answer
-from mcz.container.decoded_cache import MOST_OF_ONE, Run
+from mcz.container.caches import MOST_OF_ONE, Run
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.segments import (

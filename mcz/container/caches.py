@@ -1,16 +1,22 @@
-"""Cache of decoded segments, for neighboring windows."""
+"""Caches of an open file: decoded segments, for neighboring windows, and metadata of clips."""
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
+from sys import intern
 from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.container import payloads
+from mcz.container.chunks import Chunk
+from mcz.container.directory import ClipRow
+from mcz.container.limits import MIB
+from mcz.model.schema import parse_until
 from mcz.model.types import Values
 
 MOST_BYTES = 8 * 2**20  # of a file
@@ -105,3 +111,26 @@ class SharedCache(DecodedCache):
 
     def put(self, key: Hashable, run: Run) -> None:
         self._store.put((self._owner, key), run)
+
+
+MOST_KEPT = 16 * MIB  # bytes, about: 40,000 clips of three keys
+PAIR = 100  # bytes of a pair in Python, without its letters
+
+
+class MetadataCache:
+    """Cache of the metadata in CLIPs, up to ``MOST_KEPT``."""
+
+    def __init__(self) -> None:
+        self._pairs: dict[str, dict[str, str]] = {}
+        self._size = 0
+
+    def of(self, row: ClipRow, payload: Callable[[Chunk], bytes]) -> Mapping[str, str]:
+        """Return the metadata in the CLIP of ``row``, whose payload is read unless cached."""
+        pairs = self._pairs.get(row.name)
+        if pairs is None:
+            clip = parse_until(payloads.Clip, payload(row.clip), row.clip.label, "source")
+            pairs = {intern(pair.key): pair.value for pair in clip.metadata}
+            self._size += PAIR + sum(PAIR + len(key) + len(pairs[key]) for key in pairs)
+            if self._size <= MOST_KEPT:
+                self._pairs[row.name] = pairs
+        return pairs
