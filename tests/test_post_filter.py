@@ -18,7 +18,7 @@ import mcz
 from mcz.codecs.transforms.post_filter import CUTOFFS, DELAY, SCALE, PostFilter, filter_rows
 from mcz.codecs.transforms.post_filter import filter_taps as taps_of
 from mcz.errors import MotionError, OptionError
-from mcz.files.reading.post_filtering import filtered_motion, filtered_part
+from mcz.files.reading.post_filtering import FilteredClip
 from mcz.model.motion import Channel, Motion, Signal
 from mcz.sources.sample import acclaim_walk, marker_walk
 from tests.motions import write_bytes
@@ -184,18 +184,18 @@ def test_parts_are_cut_out_of_the_whole() -> None:
     whole = mcz.post_filter(motion)
     rows = whole.signals[0].values
     with mcz.open(write_bytes(motion)) as file:
-        clip = next(iter(file.clips.values()))
-        values, mask = filtered_part(clip, (9, 30), [2, 0])
+        clip = FilteredClip(next(iter(file.clips.values())))
+        values, mask = clip.read_masked((9, 30), [2, 0])
         columns = [6, 7, 8, 0, 1, 2]
         assert same(values, rows[9:30, columns])
         assert np.array_equal(mask, motion.signals[0].mask[9:30, columns])
-        made = filtered_motion(clip, (9, 30))
+        made = clip.motion((9, 30))
         assert same(made.signals[0].values, rows[9:30])
         assert made.metadata == whole.metadata
         with pytest.raises(OptionError, match="has frames 0 to"):
-            filtered_part(clip, (9, 10**6))
+            clip.read_masked((9, 10**6))
         with pytest.raises(MotionError, match="no joint"):
-            filtered_part(clip, None, ["nobody"])
+            clip.read_masked(None, ["nobody"])
 
 
 def test_resolutions_are_filtered_before_they_are_thinned() -> None:
@@ -206,6 +206,6 @@ def test_resolutions_are_filtered_before_they_are_thinned() -> None:
     with mcz.open(write_bytes(plain, codec="mrdwt", T_g=1.0)) as file:
         clip = next(iter(file.clips.values()))
         meant = mcz.post_filter(replace(clip.motion(resolution=2), source=None))
-        made = filtered_motion(clip, (4, 40), 2, decimate=True)
+        made = FilteredClip(clip).motion((4, 40), 2, decimate=True)
         assert same(made.values, meant.values[4:40:4])
         assert made.frame_rate == 30

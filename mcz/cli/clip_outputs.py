@@ -80,7 +80,9 @@ def _select(clip: Clip, options: DecodeOptions) -> ClipSelection:
         frames = start, clip.n_frames if stop is None else stop
     selection = ClipSelection
     if options.filtered:
-        selection = FilteredSelection
+        from mcz.files.reading.post_filtering import FilteredClip
+
+        clip, selection = FilteredClip(clip, options.rate), FilteredSelection
     elif options.preview:
         selection = PreviewSelection
     return selection(clip, frames, options.resolution, options.decimate, options.rate)

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from mcz.model.clock import Timeline
     from mcz.model.motion import Motion
 
-Masked = tuple[Values, NDArray[np.bool_] | None]
-
 
 @dataclass(frozen=True, slots=True)
 class ClipSelection:
@@ -52,7 +50,8 @@ class ClipSelection:
 
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
         """The channels of ``joints``, under their ``names``."""
-        return self._table(*self._rows(joints), 0, names)
+        values, mask = self.clip.read_masked(self.frames, joints, self.resolution)
+        return self._table(values, mask, 0, names)
 
     def of_signal(self, signal: int, stored: bool, names: list[str], units: list[str]) -> Table:
         """All channels of another signal, in their units, or as ``stored``."""
@@ -113,34 +112,12 @@ class ClipSelection:
     def _timeline(self) -> Timeline | None:
         return self.clip.timeline_at(self.rate)
 
-    def _rows(self, joints: Sequence[int | str] | None) -> Masked:
-        return self.clip.read_masked(self.frames, joints, self.resolution)
-
 
 class FilteredSelection(ClipSelection):
-    """The same, with the post filter."""
+    """The same of a ``FilteredClip``."""
 
     def fidelity(self, data: bytes) -> str:
         return FILTERED
-
-    def source_bytes(self) -> bytes:
-        from mcz.files.reading.post_filtering import filtered_source
-
-        return filtered_source(
-            self.clip, self.frames, self.resolution, decimate=self.decimate, rate=self.rate
-        )
-
-    def motion(self) -> Motion:
-        from mcz.files.reading.post_filtering import filtered_motion
-
-        return filtered_motion(
-            self.clip, self.frames, self.resolution, decimate=self.decimate, rate=self.rate
-        )
-
-    def _rows(self, joints: Sequence[int | str] | None) -> Masked:
-        from mcz.files.reading.post_filtering import filtered_part
-
-        return filtered_part(self.clip, self.frames, joints, self.resolution, rate=self.rate)
 
 
 class PreviewSelection(ClipSelection):

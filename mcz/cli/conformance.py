@@ -152,9 +152,9 @@ def _values(
     clip: Clip, given: argparse.Namespace, resolution: int, signal: int
 ) -> tuple[Values, NDArray[np.bool_] | None]:
     if given.post_filter and not signal:  # FILT-01
-        from mcz.files.reading.post_filtering import filtered_part
+        from mcz.files.reading.post_filtering import FilteredClip
 
-        return filtered_part(clip, given.frames, given.joints, resolution)
+        clip = FilteredClip(clip)
     return clip.read_masked(given.frames, given.joints, resolution, signal=signal)
 
 

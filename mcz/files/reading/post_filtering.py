@@ -6,7 +6,6 @@ values. SPEC.md, "Post filter", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -16,15 +15,15 @@ import numpy as np
 from mcz.codecs.transforms.post_filter import PostFilter, filter_rows
 from mcz.errors import MotionError, OptionError
 from mcz.files.reading.clip import Clip
+from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.source_files import SourceOptions
-from mcz.files.reading.source_info import stating_rate
-from mcz.files.reading.views import decimate_rows
+from mcz.files.reading.views import Masked
 from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import SEPARATOR
-from mcz.model.motion import Motion, Signal, Skeleton
+from mcz.model.motion import Motion, Signal, Skeleton, joint_columns
+from mcz.model.skeleton import Joints, joint_list
 from mcz.model.types import Bools, Floats, Values
-from mcz.sources import FORMATS
 
 NOTE = "post-filtered"  # the source-note of a filtered motion ends with it
 
@@ -71,84 +70,73 @@ def live_filter(skeleton: Skeleton, rate: Fraction | None, name: str = "live") -
     return PostFilter(skeleton.n_channels, *_settings(name, skeleton, rate, 1))
 
 
-def filtered_part(
-    clip: Clip,
-    frames: tuple[int, int] | None = None,
-    joints: Sequence[int | str] | None = None,
-    resolution: int = 0,
-    *,
-    rate: Fraction | None = None,
-) -> tuple[Values, Bools | None]:
-    """The whole clip is filtered, then the part cut out; shapes as of ``clip.read_masked``."""
-    info, skeleton = clip.signals[0], clip.skeleton
-    start, stop = clip.checked_range(frames)
-    per_frame = info.layout.samples_per_frame
-    _check_markers(clip.name, skeleton, info.channels is not None)
-    settings = _settings(clip.name, skeleton, rate or clip.frame_rate, per_frame)
-    values, mask = clip.read_masked(None, None, resolution)  # FILT-04
-    rows = slice(start * per_frame, stop * per_frame)  # FILT-04
-    columns: Any = slice(None)
-    if joints is not None:
-        columns = [c for joint in joints for c in skeleton.columns(skeleton.find(joint))]
-    filtered = _filter(values, mask, *settings)[rows, columns]
-    return filtered, None if mask is None else mask[rows, columns]
+class FilteredClip(Clip):
+    """``clip`` with the post filter; ``rate`` replaces its frame rate. Raises as ``post_filter``.
 
+    Of the motion all is filtered, then a part is cut out. Its source has filtered positions, in the
+    style of the original file.
+    """
 
-def filtered_motion(
-    clip: Clip,
-    frames: tuple[int, int] | None = None,
-    resolution: int = 0,
-    *,
-    decimate: bool = False,
-    rate: Fraction | None = None,
-) -> Motion:
-    """As ``clip.motion``, without a source: the whole clip is filtered, then the part cut out."""
-    motion = _filtered_on_grids(clip, frames, resolution, decimate, rate)
-    return _with_positions(motion, motion.signals[0].values)
+    def __init__(self, clip: Clip, rate: Fraction | None = None) -> None:
+        super().__init__(clip.container, clip._row)
+        self._rate, info = rate, clip.signals[0]
+        _check_markers(self.name, self.skeleton, info.channels is not None)
+        per_frame = info.samples_per_frame
+        self._settings = _settings(self.name, self.skeleton, self.frame_rate, per_frame)
 
+    @property
+    def frame_rate(self) -> Fraction | None:
+        return self._rate or super().frame_rate
 
-def filtered_source(
-    clip: Clip,
-    frames: tuple[int, int] | None = None,
-    resolution: int = 0,
-    *,
-    decimate: bool = False,
-    rate: Fraction | None = None,
-) -> bytes:
-    """As ``clip.source_bytes``, with filtered positions in the style of the source."""
-    motion = _filtered_on_grids(clip, frames, resolution, decimate, rate)
-    if clip.source is None or motion.source is None:
-        raise OptionError("no source file", clip=clip.name, hint=Hint.CONVERT)
-    data: bytes = FORMATS[clip.source.format].write(stating_rate(motion, clip.frame_numbers))
-    return data
+    @property
+    def frame_rate_exact(self) -> bool:
+        return self._rate is not None or super().frame_rate_exact
 
+    def read_masked(
+        self,
+        frames: tuple[int, int] | None = None,
+        joints: Joints = None,
+        resolution: int = 0,
+        *,
+        signal: int | str = 0,
+    ) -> Masked:
+        if self.find_signal(signal):
+            return super().read_masked(frames, joints, resolution, signal=signal)
+        start, stop = self.checked_range(frames)
+        values, mask = super().read_masked(None, None, resolution)  # FILT-04
+        per_frame = self.signals[0].samples_per_frame
+        rows = slice(start * per_frame, stop * per_frame)  # FILT-04
+        columns: Any = slice(None)
+        if joints is not None:
+            columns = joint_columns(self.skeleton, joint_list(joints))
+        filtered = _filter(values, mask, *self._settings)[rows, columns]
+        return Masked(filtered, None if mask is None else mask[rows, columns])
 
-def _filtered_on_grids(
-    clip: Clip,
-    frames: tuple[int, int] | None,
-    resolution: int,
-    decimate: bool,
-    rate: Fraction | None,
-) -> Motion:
-    """``clip.motion`` with filtered values, on the grids of the clip where possible."""
-    values, mask = filtered_part(clip, frames, None, resolution, rate=rate)
-    motion = clip.motion(frames, resolution, decimate=decimate)
-    first, step = motion.signals[0], 2**resolution if decimate else 1
-    if step > 1:
-        values = decimate_rows(values, first.samples_per_frame, step)
-        mask = None if mask is None else decimate_rows(mask, first.samples_per_frame, step)
-    if rate is not None:
-        motion = replace(motion, frame_rate=rate / step, frame_rate_exact=True)
-    grids = first.grids if first.values.dtype == np.float64 else ()
-    signal = Signal(
-        np.ascontiguousarray(values),
-        grids,
-        first.name,
-        first.samples_per_frame,
-        mask,
-        grid_changes=first.grid_changes if grids else (),
-    )
-    return replace(motion, signals=(signal, *motion.signals[1:]))
+    def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
+        """The positions on the grids of the clip where possible."""
+        signal = super()._read_signal(info, start, stop, resolution)
+        if info.index:
+            return signal
+        values, mask = self.read_masked((start, stop), None, resolution)
+        on_grids = signal.values.dtype == np.float64
+        return Signal(
+            np.ascontiguousarray(values),
+            signal.grids if on_grids else (),
+            signal.name,
+            signal.samples_per_frame,
+            mask,
+            grid_changes=signal.grid_changes if on_grids else (),
+        )
+
+    def motion(
+        self, frames: tuple[int, int] | None = None, resolution: int = 0, *, decimate: bool = False
+    ) -> Motion:
+        """As of any clip, without a source."""
+        motion = super().motion(frames, resolution, decimate=decimate)
+        return _with_positions(motion, motion.signals[0].values)
+
+    def gives_file(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
+        return False
 
 
 def _check_markers(name: str, skeleton: Skeleton, has_channels: bool) -> None:
