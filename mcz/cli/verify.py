@@ -289,14 +289,14 @@ class VerifyReport:
 
     def take(self, file: File) -> None:
         """Store the report of an open file."""
-        from mcz.files.reading.verification import bytes_facts, contents
+        from mcz.cli.verification_report import bytes_facts, contents
 
         self._facts = {**bytes_facts(file.container.source), **contents(file)}
 
     def take_bytes(self, file: str) -> None:
         """Store the facts of a file that cannot be opened."""
+        from mcz.cli.verification_report import bytes_facts
         from mcz.files.reading.file import open_bytes
-        from mcz.files.reading.verification import bytes_facts
 
         with about(file):
             source = open_bytes(bytes_or_path(file))
@@ -306,16 +306,16 @@ class VerifyReport:
                 source.close()
 
     def document(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> JsonObject:
-        """The report, see ``mcz.files.reading.verification.report``."""
+        """The report, see ``verification_report.report``."""
         from mcz import __version__
-        from mcz.files.reading.verification import report
+        from mcz.cli.verification_report import report
 
         tool = f"mcz {__version__}"
         return report(self._facts, rows, tool=tool, date=self.date, quick=quick, chosen=where)
 
     def write(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> None:
         """Write the report of ``rows``, one for each part."""
-        from mcz.files.reading.verification import text_lines
+        from mcz.cli.verification_report import text_lines
 
         document = self.document(rows, quick=quick, where=where)
         self._write(document, text_lines(document))
@@ -332,7 +332,7 @@ class VerifyReport:
         ``files``: a row for each archive, unreadable ones included.
         """
         from mcz import __version__
-        from mcz.files.reading.verification import bag_lines, text_lines
+        from mcz.cli.verification_report import bag_lines, text_lines
 
         unread = [
             f"{row['file']}: {problem}"
