@@ -52,12 +52,7 @@ class Engine(Protocol):
 
 
 _ENGINE: ContextVar[Engine | None] = ContextVar("engine", default=None)
-_LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)
-
-
-def job_limit() -> int:
-    """Number of processes that a call may use: one by default."""
-    return _LIMIT.get() or DEFAULT_JOBS
+_LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)  # of processes of a call
 
 
 @contextmanager
@@ -100,7 +95,7 @@ def useful_jobs(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
     least = LEAST_STORED if stored else LEAST_BYTES
     if n_bytes < least or getattr(sys, "frozen", False):  # has no interpreter to start
         return DEFAULT_JOBS
-    return max(DEFAULT_JOBS, min(job_limit(), n_items))
+    return max(DEFAULT_JOBS, min(_LIMIT.get() or DEFAULT_JOBS, n_items))
 
 
 def threads_each(jobs: int) -> int:

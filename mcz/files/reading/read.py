@@ -163,19 +163,15 @@ def choose_skeleton(
 
 
 def _check_asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> SkeletonChoice:
-    check_own(str(path), skeleton, label, counts)
+    """``skeleton``; raises SourceError if it has none of the bones but the root."""
+    match = match_bones(skeleton, counts)
+    if match.is_foreign:
+        raise SourceError(f"{label} has none of its bones: {_listed(match.lacking)}", path=path)
     return SkeletonChoice(skeleton, "")
 
 
 def _file_of(skeleton: Skeleton) -> str:
     return _printable(Path(skeleton.source.path).name) if skeleton.source is not None else ""
-
-
-def check_own(path: str, skeleton: Skeleton, label: str, counts: Counts) -> None:
-    """Raise SourceError where ``skeleton`` has none of the bones but the root."""
-    match = match_bones(skeleton, counts)
-    if match.is_foreign:
-        raise SourceError(f"{label} has none of its bones: {_listed(match.lacking)}", path=path)
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,12 +87,12 @@ def figures(original: Motion, decoded: Motion) -> JsonObject:
     """The figures of a record by their metric ids, rounded; None where there is none."""
     contacts = bool(find_feet(original.skeleton))
     entries = compare(original, decoded, contacts=contacts).entries()
-    return {key: _rounded(value) for key, value in entries.items() if key not in LEFT_OUT}
-
-
-def _rounded(value: object) -> object:
-    """Ten significant digits of a float: more than measures agree on, in fewer bytes."""
-    return float(f"{value:.10g}") if isinstance(value, float) else value
+    # Ten significant digits are more than measures agree on, in fewer bytes.
+    return {
+        key: float(f"{value:.10g}") if isinstance(value, float) else value
+        for key, value in entries.items()
+        if key not in LEFT_OUT
+    }
 
 
 def texts_of(entries: Params) -> dict[str, str]:
