@@ -219,7 +219,7 @@ def test_metadata_of_clips_are_read_once(archive: Path, monkeypatch: pytest.Monk
         calls.append(where)
         return parse_until(record, payload, where, before)
 
-    monkeypatch.setattr("mcz.container.metadata.parse_until", count_parse)
+    monkeypatch.setattr("mcz.container.caches.parse_until", count_parse)
     for most in (2**20, 0):  # bytes that are kept
         monkeypatch.setattr("mcz.container.caches.MOST_KEPT", most)
         calls.clear()
