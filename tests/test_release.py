@@ -14,6 +14,8 @@ import pytest
 
 import mcz
 from tools import make_vectors
+from tools.figures import __main__ as figures
+from tools.figures.table import names_in, replaced
 
 ROOT = Path(__file__).parents[1]
 REGISTRATIONS = ROOT / "conformance" / "registrations" / "README.md"
@@ -96,3 +98,14 @@ def test_archive_of_the_specification(tmp_path: Path) -> None:
     for part in ("annex", "vectors"):
         files = [p for p in (ROOT / "conformance" / part).rglob("*") if p.is_file()]
         assert {p.relative_to(ROOT).as_posix() for p in files} <= contents.keys()
+
+
+def test_marks_of_figures() -> None:
+    """Each mark stands above a table that ``tools.figures`` can replace, and stands once."""
+    names = [name for path in figures.DOCUMENTS for name in names_in(path.read_text("utf-8"))]
+    marks = [re.findall("(?m)^<!-- figures: ", path.read_text("utf-8")) for path in figures.DOCUMENTS]
+    assert len(names) == len(set(names)) == sum(map(len, marks))
+    before = "<!-- figures: a -->\n| x |\n|---|\n| 1 |\n\n<!-- figures: b -->\n| y |\n"
+    assert replaced(before, {"a": "| z |\n"}) == (
+        "<!-- figures: a -->\n| z |\n\n<!-- figures: b -->\n| y |\n"
+    )
