@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import importlib
+import importlib.util
 import re
 import subprocess
 import sys
@@ -119,6 +121,28 @@ def test_the_package_stands_alone() -> None:
     """The tools, tests and runner import the package, never the other way round."""
     around = re.compile(r"(?m)^\s*(?:from|import) (?:tools|tests|conformance)\b.*")
     assert not faults(lambda path: around.findall(path.read_text("utf-8")))
+
+
+@pytest.mark.parametrize("folder", ["tools", "tests", "conformance"])
+def test_what_others_import_of_the_package_is_there(folder: str) -> None:
+    """Each name, at any depth of their code, but for what 0.9 alone has."""
+    asked = {
+        (node.module, alias.name)
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "mcz"
+        for alias in node.names
+    }
+    missing = {f"{module}.{name}" for module, name in asked if not _is_there(module or "", name)}
+    assert missing <= {"mcz.editing.protecting.redundancy_of"}
+
+
+def _is_there(module: str, name: str) -> bool:
+    try:
+        found = importlib.import_module(module)
+    except ImportError:
+        return False
+    return hasattr(found, name) or importlib.util.find_spec(f"{module}.{name}") is not None
 
 
 def longest_module(parts: list[str]) -> str:

@@ -103,7 +103,9 @@ def test_archive_of_the_specification(tmp_path: Path) -> None:
 def test_marks_of_figures() -> None:
     """Each mark stands above a table that ``tools.figures`` can replace, and stands once."""
     names = [name for path in figures.DOCUMENTS for name in names_in(path.read_text("utf-8"))]
-    marks = [re.findall("(?m)^<!-- figures: ", path.read_text("utf-8")) for path in figures.DOCUMENTS]
+    marks = [
+        re.findall("(?m)^<!-- figures: ", path.read_text("utf-8")) for path in figures.DOCUMENTS
+    ]
     assert len(names) == len(set(names)) == sum(map(len, marks))
     before = "<!-- figures: a -->\n| x |\n|---|\n| 1 |\n\n<!-- figures: b -->\n| y |\n"
     assert replaced(before, {"a": "| z |\n"}) == (

@@ -19,7 +19,7 @@ from mcz.errors import FormatError, LimitError, MczError, OptionError, Unsupport
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.faults import validate
 from mcz.files.reading.file import File
-from mcz.files.reading.post_filtering import filtered_part
+from mcz.files.reading.post_filtering import FilteredClip
 from mcz.files.reading.report import info
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.model.clock import TIMES, times_fault
@@ -151,9 +151,10 @@ def _others(clip: Clip, rng: random.Random) -> None:
     with suppress(OptionError, LimitError):
         clip.preview()
     with suppress(MczError):
-        whole = filtered_part(clip)
+        filtered = FilteredClip(clip)
+        whole = filtered.read_masked()
         a, b = sorted((rng.randint(0, clip.n_frames), rng.randint(0, clip.n_frames)))
-        part = filtered_part(clip, (a, b))
+        part = filtered.read_masked((a, b))
         per_frame = clip.signals[0].layout.samples_per_frame
         rows, columns = slice(a * per_frame, b * per_frame), list(range(clip.n_channels))
         hold(_bits(part, rows, columns) == _bits(whole, rows, columns, cut=True), "filtered part")

@@ -18,7 +18,7 @@ from mcz.codecs import codec_by_name
 from mcz.container import payloads
 from mcz.container.limits import BASE, LARGE
 from mcz.container.metadata import Record
-from mcz.container.value_hash import value_hash
+from mcz.container.model_records import value_hash
 from mcz.container.writer import Writer
 from mcz.files.editing.unpacking import named_files
 from mcz.files.writing.clip_writer import write_clip, write_skeleton
