@@ -6,6 +6,7 @@ by bytes that were inserted or cut off before them, as intact packets show.
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain as chain_from
@@ -305,11 +306,8 @@ def check_recovery(target: Target) -> Recovery | None:
 
     Raises AccessError where it cannot be read.
     """
-    source = open_bytes(target)
-    try:
+    with closing(open_bytes(target)) as source:
         recovery, sets = examine(source)
-    finally:
-        source.close()
     return recovery if sets else None
 
 

@@ -12,7 +12,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import fields
 from itertools import pairwise
 from operator import eq
@@ -23,7 +23,7 @@ from mcz.container.chunks import CRC, END_MAGIC, FOOT, SIGNATURE, Chunk, ChunkTy
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
-from mcz.errors import FormatError, MczError, OptionError, remark_of
+from mcz.errors import FormatError, MczError, OptionError, error_context, remark_of
 from mcz.files.editing.chunk_copier import UNPROTECTED
 from mcz.files.editing.cutting import ClipCut, plan_cut
 from mcz.files.editing.extraction import Copying
@@ -67,16 +67,10 @@ def repair(
     A file with recovery data (``mcz.protect``) is first restored byte for byte: the above applies
     only if more of it is bad than they can restore, and to bytes appended after it.
     """
-    data = open_bytes(source)
-    try:
+    with closing(open_bytes(source)) as data, error_context(path=data.name):
         _refuse_same(data, target)
         with replacing(target, force=force, inputs=(source,)) as stream, rereadable(stream) as own:
             return _repair_to(data, own, max_decoded, progress)
-    except FormatError as error:
-        error.add(path=data.name)
-        raise
-    finally:
-        data.close()
 
 
 def _refuse_same(source: ByteSource, target: Target) -> None:

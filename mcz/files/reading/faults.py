@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,6 +19,7 @@ from mcz.errors import (
     MczError,
     OptionError,
     UnsupportedError,
+    error_context,
     remark_of,
 )
 from mcz.files.jobs import limit_jobs
@@ -64,17 +66,11 @@ def quick_check(
     is called with the number of bytes done and the size of the file. Raises UnsupportedError where
     it needs a newer reader, AccessError where it cannot be read.
     """
-    source = open_bytes(target)
-    try:
+    with closing(open_bytes(target)) as source, error_context(path=source.name):
         if source.grows():
             with open(target) as file:
                 return _check_quickly(file.container.source, progress)
         return _check_quickly(source, progress)
-    except MczError as error:
-        error.add(path=source.name)
-        raise
-    finally:
-        source.close()
 
 
 def _check_quickly(

@@ -22,10 +22,10 @@ from mcz.errors import (
     AccessError,
     ChecksumError,
     FormatError,
-    MczError,
     MotionError,
     OptionError,
     TruncatedError,
+    error_context,
     reason_of,
 )
 from mcz.files.reading.clip import Clip
@@ -310,11 +310,8 @@ def open(
     }
     source = open_bytes(target)
     try:
-        return _open_source(source, options)
-    except MczError as error:
-        source.close()
-        error.add(path=source.name)
-        raise
+        with error_context(path=source.name):
+            return _open_source(source, options)
     except BaseException:
         source.close()
         raise

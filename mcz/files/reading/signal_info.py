@@ -18,7 +18,7 @@ from mcz.container.limits import check
 from mcz.container.model_records import parse_channels
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
-from mcz.errors import FormatError
+from mcz.errors import FormatError, error_context
 from mcz.model.clock import TIMES, times_signal_fault
 from mcz.model.identity import IdentityCache
 from mcz.model.motion import ROLES, Channel, Skeleton
@@ -122,11 +122,8 @@ def read_signal(
         coded = None
     n_channels = skeleton.n_channels if channels is None else len(channels)
     check(f"{where}: channels", n_channels, container.profile.channels)
-    try:
+    with error_context(where=where):
         groups, grids = _partition(own, coded)
-    except FormatError as error:
-        error.add(where=where)
-        raise
     layout = Layout(
         own.skip + row.n_frames + own.spare,
         groups,
