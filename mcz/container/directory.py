@@ -409,6 +409,10 @@ class Directory:
     end: int = 0
     indexes: tuple[IndexPlace, ...] = slot(default=(), compare=False)
 
+    def ids(self, kind: bytes) -> list[bytes]:
+        """The ids of its SKEL, MODL or SRCE, in file order."""
+        return [id_ for of, id_ in self.shared if of == kind]
+
     @property
     def index_bytes(self) -> int:
         """Bytes of the INDX chunks that it was read from."""

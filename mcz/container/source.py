@@ -12,7 +12,8 @@ import os
 import sys
 import time
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 from typing import Any, BinaryIO, cast
@@ -34,6 +35,22 @@ def lock(stream: BinaryIO) -> bool:
             return False
         time.sleep(PAUSE)
     return True
+
+
+@contextmanager
+def locked_file(path: Path) -> Iterator[BinaryIO]:
+    """The file at ``path``, to read and write, which no other process appends to in the block.
+
+    Raises AccessError where one does, and where the file cannot be opened.
+    """
+    try:
+        stream = open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
+    except (OSError, ValueError) as error:
+        raise AccessError(reason_of(error), path=path) from None
+    with stream:
+        if not lock(stream):
+            raise AccessError("another process is appending to it", path=path)
+        yield stream
 
 
 def is_locked(stream: BinaryIO) -> bool:

@@ -6,7 +6,6 @@ Recovery data are appended, too. SPEC.md, "FOOT" and "RECV", are normative;
 
 from __future__ import annotations
 
-import builtins
 import os
 import shutil
 import tempfile
@@ -34,7 +33,7 @@ from mcz.container.index import build_index
 from mcz.container.reader import Container
 from mcz.container.recovery.blocks import Key, Shape, Step, encode_packets, read_packet, shape_for
 from mcz.container.scan import scan
-from mcz.container.source import ByteSource, lock
+from mcz.container.source import ByteSource, locked_file
 from mcz.errors import (
     AccessError,
     FormatError,
@@ -42,7 +41,6 @@ from mcz.errors import (
     OptionError,
     TruncatedError,
     UnsupportedError,
-    reason_of,
 )
 from mcz.files.reading.faults import recovery_chunks
 from mcz.model.schema import parse
@@ -82,13 +80,7 @@ def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
     writing fails, it ends at its old end, or at that FOOT. Raises AccessError where another process
     is appending to the file.
     """
-    try:
-        stream = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
-    except (OSError, ValueError) as error:
-        raise AccessError(reason_of(error), path=path) from None
-    with stream:
-        if not lock(stream):
-            raise AccessError("another process is appending to it", path=path)
+    with locked_file(path) as stream:
         container, tail = _whole_part(stream, path, salvage, force)
         end = container.directory.end  # the writer moves it
         with tempfile.SpooledTemporaryFile(IN_MEMORY, dir=str(path.parent)) as added:

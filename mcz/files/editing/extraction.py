@@ -166,9 +166,8 @@ class Copier(ChunkCopier):
     def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> None:
         """Write the new file; ``alone``: these clips and what they need, nothing else."""
         self.total = sum(len(part.rows) for cut in cuts for part in cut.signals)
-        for (kind, _), chunk in self.container.directory.shared.items():
-            if kind == ChunkType.MODL:  # only the codec knows which models a clip needs
-                self.writer.shared(kind, self.container.payload(chunk))
+        for id_ in self.container.directory.ids(ChunkType.MODL):
+            self.shared(ChunkType.MODL, id_)  # only the codec knows which models a clip needs
         if not alone:
             self.skeletons()
             self.before_clips()
@@ -186,9 +185,8 @@ class Copier(ChunkCopier):
 
     def skeletons(self) -> None:
         """Copy every skeleton, also those without a clip."""
-        for kind, id_ in self.container.directory.shared:
-            if kind == ChunkType.SKEL:
-                self.skeleton(id_)
+        for id_ in self.container.directory.ids(ChunkType.SKEL):
+            self.skeleton(id_)
 
     def attachments(self) -> None:
         for name in self.container.directory.attachments:

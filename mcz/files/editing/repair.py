@@ -136,9 +136,7 @@ def _content(source: ByteSource) -> Content:
     def mark(chunk: Chunk) -> bytes:
         return container.source.read(chunk.offset + chunk.size - CRC.size, CRC.size)
 
-    content: Content = {
-        ("skeleton", id_) for kind, id_ in directory.shared if kind == ChunkType.SKEL
-    }
+    content: Content = {("skeleton", id_) for id_ in directory.ids(ChunkType.SKEL)}
     content |= {("alias", name, *alias) for name, alias in directory.aliases.items()}
     for name, row in directory.clips.items():
         content.add(("clip", name, mark(row.clip)))

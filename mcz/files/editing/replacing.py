@@ -19,6 +19,7 @@ from mcz.container import payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.model_records import value_hash
 from mcz.container.segments import GROUP_NOTES, MASKS, GroupNotes, SegmentHeader
+from mcz.container.source import locked_file
 from mcz.files.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
 from mcz.files.editing.extraction import Copier, Copying
 from mcz.files.editing.recoding import (
@@ -30,7 +31,7 @@ from mcz.files.editing.recoding import (
     recode_joint,
     settings_of,
 )
-from mcz.files.editing.rewriting import disk_path, lock_file
+from mcz.files.editing.rewriting import disk_path
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.files.reading.stored_clip import with_indices
@@ -104,7 +105,7 @@ def replace(
         if target is None:
             target, force, inputs = disk_path(source), True, []
             if os.name == "posix":  # elsewhere an open file cannot be replaced
-                lock_file(target, stack)
+                stack.enter_context(locked_file(target))
         stream = stack.enter_context(replacing_file(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)

@@ -6,7 +6,6 @@ is complete and has been read from end to end. ``protect``, which may rewrite a 
 
 from __future__ import annotations
 
-import builtins
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -23,10 +22,10 @@ from mcz.container.metadata import Record
 from mcz.container.reader import Container
 from mcz.container.recovery import blocks
 from mcz.container.recovery.blocks import check_redundancy
-from mcz.container.source import lock
+from mcz.container.source import locked_file
 from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
-from mcz.errors import AccessError, FormatError, OptionError, reason_of
+from mcz.errors import FormatError, OptionError
 from mcz.files.editing.appending import (
     DEFAULT,
     Protection,
@@ -100,7 +99,7 @@ def plan_whole(file: File) -> Plan:
 def used_by(file: File, names: Iterable[str]) -> set[Shared]:
     """The skeletons with their bases, the templates and the models that these clips need."""
     container, used = file.container, set[Shared]()
-    has_models = any(kind == ChunkType.MODL for kind, _ in container.directory.shared)
+    has_models = bool(container.directory.ids(ChunkType.MODL))
     for name in names:
         row = container.directory.clips[name]
         source = container.clip_head(row).source
@@ -220,7 +219,7 @@ def rewriting(
     """
     with ExitStack() as stack:
         if output is None:
-            lock_file(disk_path(target), stack)
+            stack.enter_context(locked_file(disk_path(target)))
         yield Rewriting(target, output, force, stack.enter_context(open(target)))
 
 
@@ -231,16 +230,6 @@ def disk_path(target: Target) -> Path:
             "only a file on disk can be rewritten in place; name an output", path=named_path(target)
         )
     return Path(target).resolve()
-
-
-def lock_file(path: Path, stack: ExitStack) -> None:
-    """Keep others from appending to a file until ``stack`` ends; raises AccessError."""
-    try:
-        stream = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the stack
-    except (OSError, ValueError) as error:
-        raise AccessError(reason_of(error), path=path) from None
-    if not lock(stack.enter_context(stream)):
-        raise AccessError("another process is appending to it", path=path)
 
 
 def protect(

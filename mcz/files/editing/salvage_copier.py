@@ -157,11 +157,10 @@ class Repairer(Copier):
             self.repair.clips.append(cut.clip.name)
 
     def skeletons(self) -> None:
-        for kind, id_ in self.container.directory.shared:
-            if kind == ChunkType.SKEL:
-                with suppress(FormatError):  # its fault is reported with the clips
-                    self.skeleton(id_)
-                    self.repair.skeletons.append(self.container.skeleton(id_).name or id_.hex())
+        for id_ in self.container.directory.ids(ChunkType.SKEL):
+            with suppress(FormatError):  # its fault is reported with the clips
+                self.skeleton(id_)
+                self.repair.skeletons.append(self.container.skeleton(id_).name or id_.hex())
 
     def attachments(self) -> None:
         for name, attachment in self.file.attachments.items():

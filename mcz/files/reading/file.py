@@ -199,7 +199,7 @@ class File:
     @cached_property
     def skeletons(self) -> list[StoredSkeleton]:
         """The skeletons with their ids, in file order."""
-        ids = [id_ for kind, id_ in self.container.directory.shared if kind == ChunkType.SKEL]
+        ids = self.container.directory.ids(ChunkType.SKEL)
         return [StoredSkeleton(id_, self.skeleton(id_)) for id_ in ids]
 
     def skeleton(self, id_: bytes, *, with_source: bool = False) -> Skeleton:

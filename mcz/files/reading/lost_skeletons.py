@@ -43,26 +43,26 @@ def restore_skeletons(container: Container) -> None:
     lost = _lost_ids(container)
     if not lost:
         return
-    for (kind, id_), chunk in list(container.directory.shared.items()):
-        if kind == ChunkType.SRCE:
-            with suppress(MczError):  # another format, damaged too, or not an ASF
-                made = _asf_skels(container, id_, lost)
-                _restore(container, lost, made, f"its ASF, {chunk.label}")
-    for kind, id_ in list(container.directory.shared):
-        if kind == ChunkType.SKEL and lost:
-            with suppress(MczError):
-                _restore(container, lost, _base_skels(container, id_), f"SKEL {id_.hex()}")
-    rows = [row for row in container.directory.clips.values() if row.skeleton in lost]
-    for row in rows:
-        if row.skeleton in lost:
-            with suppress(MczError):
-                _restore(
-                    container, lost, _clip_skels(container, row), f"the source of {row.name!r}"
-                )
-    for row in rows:
+    for origin, candidates in _origins(container, lost):
+        with suppress(MczError):  # it is of another format, or damaged too
+            _restore(container, lost, candidates, origin)
+    for row in container.directory.clips.values() if lost else ():
         if row.skeleton in lost:
             with suppress(MczError):
                 _without_joints(container, row)
+
+
+def _origins(container: Container, lost: set[bytes]) -> Iterator[tuple[str, Iterator[bytes]]]:
+    """Possible origins of lost skeletons, and the payloads of SKEL that each gives."""
+    directory = container.directory
+    for id_ in directory.ids(ChunkType.SRCE):
+        label = directory.shared[ChunkType.SRCE, id_].label
+        yield f"its ASF, {label}", _asf_skels(container, id_, lost)
+    for id_ in directory.ids(ChunkType.SKEL) if lost else ():
+        yield f"SKEL {id_.hex()}", _base_skels(container, id_)
+    for row in directory.clips.values() if lost else ():
+        if row.skeleton in lost:
+            yield f"the source of {row.name!r}", _clip_skels(container, row)
 
 
 def _without_joints(container: Container, row: ClipRow) -> None:
@@ -124,11 +124,10 @@ def _lost_ids(container: Container) -> set[bytes]:
     directory = container.directory
     named = {row.skeleton for row in directory.clips.values()}
     named |= {target for of, target in directory.aliases.values() if of == payloads.OF_SKELETON}
-    for kind, id_ in directory.shared:
-        if kind == ChunkType.SKEL:
-            with suppress(MczError):
-                base = container.skeleton_fields(id_).base
-                named |= {base} if base else set()
+    for id_ in directory.ids(ChunkType.SKEL):
+        with suppress(MczError):
+            base = container.skeleton_fields(id_).base
+            named |= {base} if base else set()
     return {id_ for id_ in named if (ChunkType.SKEL, id_) not in directory.shared}
 
 
@@ -199,10 +198,9 @@ def _zero_motion(
 
 def _bases(container: Container) -> Iterator[Skeleton | None]:
     yield None
-    for kind, id_ in list(container.directory.shared):
-        if kind == ChunkType.SKEL:
-            with suppress(MczError):
-                yield replace(container.skeleton(id_), base=id_)
+    for id_ in container.directory.ids(ChunkType.SKEL):
+        with suppress(MczError):
+            yield replace(container.skeleton(id_), base=id_)
 
 
 def _offset_ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:

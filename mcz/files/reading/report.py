@@ -55,9 +55,7 @@ def info(file: File, names: Sequence[str] | None = None, where: Where | None = N
     shared = container.directory.shared
     ids = {id_ for _, id_ in shared} if whole else file.skeleton_ids(chosen)
     used = {model["id"] for clip in clips for model in clip["models"]}
-    models = [
-        id_ for kind, id_ in shared if kind == ChunkType.MODL and (whole or id_.hex() in used)
-    ]
+    models = [id_ for id_ in container.directory.ids(ChunkType.MODL) if whole or id_.hex() in used]
     attachments = [{"name": a.name, "bytes": a.size} for a in file.attachments.values()]
     return {
         "format_version": file.header["format_version"],

@@ -253,7 +253,7 @@ def summarize(
             WrittenClip(row.name, row.n_frames, row.signals[0].n_channels, quality)
             for row in directory.clips.values()
         ),
-        n_skeletons=sum(kind == ChunkType.SKEL for kind, _ in directory.shared),
+        n_skeletons=len(directory.ids(ChunkType.SKEL)),
         n_attachments=len(directory.attachments),
         decoded_bytes=max(map(_decoded_bytes, directory.clips.values()), default=0),
         notes=notes,
