@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 
+import mcz
 from mcz.codecs.contract import Codec, Layout, Request, Span
 from mcz.codecs.lossless import best, fast
 from mcz.codecs.posewave.model import start_tables
-from mcz.codecs.posewave.row_coder import RowCoder, Stream, fresh_coder
+from mcz.codecs.posewave.model_state import USUAL
+from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
 from mcz.model.numbers import Grid, GridKind
 from tests.test_spec import SPEC
 from tools.spec_traces import best as trace_of_best
 from tools.spec_traces import fast as trace_of_fast
-from tools.spec_traces import posewave
+from tools.spec_traces import posewave, posewave_state
 
+VECTORS = Path(__file__).parents[1] / "conformance" / "vectors"
 LINES = SPEC.split("<!-- trace best -->\n```\n")[1].split("```")[0].splitlines()
 
 
@@ -61,6 +65,40 @@ def test_posewave_decodes_the_same_rows() -> None:
     for level, (kind, n_rows) in enumerate(posewave.LEVELS):
         rows.begin(level, kind, n_rows, Stream(coder, 0, posewave.STREAMS[level]))
         assert (rows.decode() * 2).tolist() == [list(row) for row in posewave.DOUBLES[level]]
+
+
+@pytest.mark.parametrize("vector", posewave_state.VECTORS)
+def test_digest_of_the_state_of_posewave(vector: str) -> None:
+    """The plain decoder and ours end in the same state, to the last bit."""
+    with mcz.open(VECTORS / f"valid/posewave/{vector}.mcz") as file:
+        info = file.only_clip().signals[0]
+        _, streams = file.container.streams(info.rows[0], info.counts, None)
+    levels = list(streams.values())
+    frames, n_levels, dependent = posewave_state.VECTORS[vector]
+    classes = np.array(posewave_state.CLASSES)
+    n = len(classes)
+    start = start_tables()[0]
+    header = SimpleNamespace(prior=None, refining=False, dependent=dependent, start=start)
+    coder = fresh_coder(start)
+    rows = RowCoder(header, classes, np.ones(n, bool), coder, "rows")
+    for level, (kind, n_rows) in enumerate(posewave_state.levels_of(frames, n_levels)):
+        stream = Stream(coder, 0, levels[level])
+        if level == 0:
+            kept = np.zeros(n, np.int64)
+            code_head(stream, np.where(classes, 0, 1), kept, kept.copy(), "head")
+        rows.begin(level, kind, n_rows, stream)
+        rows.decode()
+    ours, columns = rows.model, rows.model.columns[0]
+    numbers = [
+        *ours.variances[0, :n],
+        *(columns[a, b] for b in range(1, n) for a in range(b)),
+        *(ours.seen[0], *ours.taps.ravel(), *ours.tap_energy.ravel()),
+        *(*ours.level_weights.ravel(), *ours.own_weights[:, :n].T.ravel()),
+        *ours.features[USUAL, :n],
+    ]
+    assert numbers == posewave_state.numbers_of(posewave_state.decode_state(vector, levels))
+    digest = posewave_state.digest(numbers)
+    assert f"| {vector} | `{digest}` |" in SPEC
 
 
 @pytest.mark.parametrize(

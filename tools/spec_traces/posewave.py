@@ -66,7 +66,8 @@ class Row:
 class Model:
     """The state that "State of rows" lists."""
 
-    def __init__(self, classes: Sequence[int]) -> None:
+    def __init__(self, classes: Sequence[int], *, dependent: bool = True) -> None:
+        self.dependent = dependent
         start = json.loads((ANNEX / "posewave_start.json").read_text("utf-8"))
         table, n = start["sets"][0], len(classes)
 
@@ -98,19 +99,25 @@ class Model:
 class RowDecoder:
     """Decodes the rows of a level; keeps lines of what it does."""
 
-    def __init__(self, model: Model, kind: int, n_rows: int, above: Sequence[Row]) -> None:
+    def __init__(self, model: Model, kind: int, n_rows: int, levels: Sequence[list[Row]]) -> None:
+        """``levels`` are those of coarser details, the coarsest first."""
         self.model, self.kind, self.n = model, kind, len(model.usual)
         self.rows = [Row(self.n) for _ in range(n_rows)]
-        self.above, self.doubles = above, [[0] * self.n for _ in range(n_rows)]
+        self.levels, self.doubles = levels, [[0] * self.n for _ in range(n_rows)]
 
     def near(self, m: int) -> dict[str, Row]:
-        """The rows around row m; there is one level of details, so no grandparent."""
-        none, above = Row(self.n), self.above
-        before = [self.rows[m - k] if m >= k else none for k in (1, 2, 3)]
-        rows = dict(zip(("before1", "before2", "before3"), before, strict=True))
+        """The rows around row m."""
+        none = [Row(self.n)]
+        above = self.levels[-1] if self.levels else none
+        higher = self.levels[-2] if len(self.levels) > 1 else none
         up = min(m // 2, len(above) - 1)
-        places = {"parent": up, "next": min(up + 1, len(above) - 1), "last": max(up - 1, 0)}
-        return rows | {name: above[at] if above else none for name, at in places.items()}
+        return {
+            **{f"before{k}": self.rows[m - k] if m >= k else none[0] for k in (1, 2, 3)},
+            "parent": above[up],
+            "next": above[min(up + 1, len(above) - 1)],
+            "last": above[max(up - 1, 0)],
+            "grand": higher[min(up // 2, len(higher) - 1)],
+        }
 
     def decode(self, m: int) -> None:
         model, near, kind = self.model, self.near(m), self.kind
@@ -156,7 +163,7 @@ class Channels:
         before, parent = near["before1"].mean, near["parent"].mean
         names = ("before1", "before2", "before3", "grand", "parent", "next", "last")
         return [
-            *(near[name].magnitudes[c] if name in near else 0.0 for name in names),
+            *(near[name].magnitudes[c] for name in names),
             *(here[c - k] if c >= k else 0.0 for k in (1, 2, 3, 4)),
             total / c if c > 3 else before,
             *(before, parent, model.usual[c]),
@@ -212,7 +219,8 @@ class Channels:
         error = -error if far is not None and far != 1 - down else error
         k = rounded + error
         double = 2 * k - (k > 0) + (k < 0) if odd else 2 * k
-        self.state = (AFTER_ODD if k % 2 else AFTER_EVEN)[self.state]
+        if model.dependent:
+            self.state = (AFTER_ODD if k % 2 else AFTER_EVEN)[self.state]
         value = double / 2
         miss = value - mean
         found = min(abs(miss), 4096.0)
@@ -366,20 +374,29 @@ def size_of(weights: Sequence[float], features: Sequence[float]) -> float:
     return min(max(size, 0.008), 4096.0)
 
 
+def decode_level(
+    model: Model, kind: int, n_rows: int, levels: Sequence[list[Row]]
+) -> tuple[RowDecoder, list[list[str]]]:
+    """Decode the rows of a level, and give the lines of each."""
+    if kind and model.seen > 40.0:
+        model.variances = [d * (40.0 / model.seen) for d in model.variances]
+        model.seen = 40.0
+    decoder, lines = RowDecoder(model, kind, n_rows, levels), []
+    for m in range(n_rows):
+        model.lines = []
+        decoder.decode(m)
+        lines.append(model.lines)
+    return decoder, lines
+
+
 def levels() -> Iterator[tuple[list[list[int]], list[list[str]]]]:
     """Each level: 2 q of its rows, and the lines of each row."""
-    model, above = Model(CLASSES), list[Row]()
-    for number, ((kind, n_rows), stream) in enumerate(zip(LEVELS, STREAMS, strict=True)):
+    model, details = Model(CLASSES), list[list[Row]]()
+    for (kind, n_rows), stream in zip(LEVELS, STREAMS, strict=True):
         model.coder.start(stream)
-        if number and model.seen > 40.0:
-            model.variances = [d * (40.0 / model.seen) for d in model.variances]
-            model.seen = 40.0
-        decoder, lines = RowDecoder(model, kind, n_rows, above), []
-        for m in range(n_rows):
-            model.lines = []
-            decoder.decode(m)
-            lines.append(model.lines)
-        above = decoder.rows if number else []
+        decoder, lines = decode_level(model, kind, n_rows, details)
+        if kind:
+            details.append(decoder.rows)
         yield decoder.doubles, lines
 
 
