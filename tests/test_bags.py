@@ -79,7 +79,7 @@ def test_every_change_is_found(bag_path: Path) -> None:
             try:
                 problems = mcz.check_bag(bag_path).problems
             except mcz.OptionError:  # no bagit.txt
-                problems = ["no bag"]
+                problems = ["not a bag"]
             assert problems or name.startswith("tagmanifest"), name  # for which nothing vouches
             path.write_bytes(data)
     (bag_path / "data" / "more.mcz").write_bytes(b"")
@@ -135,12 +135,12 @@ def test_what_cannot_be_a_bag(archive: Path, tmp_path: Path, call: Call) -> None
     (tmp_path / "sub" / archive.name).write_bytes(bad)
     damaged, target = tmp_path / "sub" / archive.name, tmp_path / "new"
     for files, error, said in (
-        ([damaged], mcz.FormatError, "damaged, so not put into a bag"),
-        ([archive, damaged], mcz.OptionError, "would have one name"),
+        ([damaged], mcz.FormatError, "damaged, so it was not added to the bag"),
+        ([archive, damaged], mcz.OptionError, "would have the same name"),
         ([archive, tmp_path / "none"], mcz.AccessError, "no such file"),
         ([archive, tmp_path], mcz.AccessError, "not a file"),
-        ([], mcz.OptionError, "no files"),
-        ([tmp_path / "100%.mcz"], mcz.OptionError, "rename it"),
+        ([], mcz.OptionError, "at least one file"),
+        ([tmp_path / "100%.mcz"], mcz.OptionError, "rename the file"),
     ):
         with pytest.raises(error, match=said):
             mcz.bag(files, target)
@@ -151,7 +151,7 @@ def test_what_cannot_be_a_bag(archive: Path, tmp_path: Path, call: Call) -> None
             mcz.bag([archive], target, info)
     with pytest.raises(mcz.AccessError):
         mcz.bag([archive], tmp_path / "none" / "new")
-    with pytest.raises(mcz.OptionError, match="no bag"):
+    with pytest.raises(mcz.OptionError, match="not a bag"):
         mcz.check_bag(tmp_path)
     assert call("bag", archive, target, "--info", "a")[0] == 2
     assert call("bag", archive, target, "--info", "a=1", "--info", "A=2")[0] == 2

@@ -525,7 +525,7 @@ def test_charts_of_signals_by_channel(tmp_path: Path) -> None:
         ["--signal", "0", "--joint", "a"],
     ):
         assert run(*arguments, "--force", *options) == 2
-    with pytest.raises(mcz.OptionError, match="of all joints, not of 'analog'"):
+    with pytest.raises(mcz.OptionError, match="shows all joints, so 'analog' cannot be chosen"):
         mcz.plot(motion, tmp_path / "d.svg", "rate-distortion", signal="analog")
 
 
@@ -538,7 +538,7 @@ def test_charts_without_a_joint_are_of_the_first_signal(tmp_path: Path) -> None:
     motion = Motion(Skeleton(()), (Signal(np.zeros((30, 0))), analog), Fraction(50))
     plotted = mcz.plot(motion, tmp_path / "a.svg")
     assert plotted.title.endswith("analog, channels") and len(plotted.tables[0]) == 9
-    assert plotted.notes == ("8 of 12 channels; choose others by name (channels=)",)
+    assert plotted.notes == ("8 of 12 channels; choose channels by name (channels=)",)
 
 
 WALK = [*range(51, 91), *range(131, 171)]

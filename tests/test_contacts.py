@@ -82,7 +82,7 @@ def test_a_foot_stands_between_its_steps() -> None:
     standing = found.frames("lfoot")
     assert standing.sum() == sum(run.n_frames for run in found.runs)
     assert standing[[10, 150, 290]].all() and not standing[[90, 210]].any()
-    with pytest.raises(MotionError, match="'body' is not one of the feet examined: lfoot"):
+    with pytest.raises(MotionError, match="joint 'body' is not among the examined feet: lfoot"):
         found.frames("body")
 
 
@@ -108,7 +108,7 @@ def test_feet_of_the_caller() -> None:
     assert contacts(motion, [1, "b"]).runs == (Contact("b", 0, 60),)
     with pytest.raises(MotionError, match="no joint 'c'"):
         contacts(motion, ["c"])
-    with pytest.raises(MotionError, match="none of its 1 joint is a foot"):
+    with pytest.raises(MotionError, match="none of its 1 joint is named like a foot"):
         contacts(markers("a", np.zeros((60, 1, 3))))
 
 
@@ -116,7 +116,7 @@ def test_feet_of_the_caller() -> None:
     "run", [Contact("b", 0, 5), Contact("a", 6, 5), Contact("a", -1, 5), Contact("a", 3, 0)]
 )
 def test_runs_lie_in_what_was_looked_at(run: Contact) -> None:
-    with pytest.raises(MotionError, match="is not of 10 frames of"):
+    with pytest.raises(MotionError, match="does not fit 10 frames of"):
         Contacts((run,), ("a",), 10)
     assert Contacts((Contact("a", 5, 5),), ("a",), 10).frames("a").sum() == 5
 
@@ -145,7 +145,7 @@ def test_what_has_no_contacts_is_refused() -> None:
     turning = Motion(
         Skeleton((joint,), unit_cm=1.0, angle_unit=""), (Signal(np.zeros((3, 1))),), Fraction(30)
     )
-    with pytest.raises(MotionError, match="angle unit is unknown"):
+    with pytest.raises(MotionError, match="angle unit .*is unknown"):
         contacts(turning)
     own = Signal(np.zeros((9, 1)), channels=(Channel("", "emg", "V"),))
     with pytest.raises(MotionError, match="differ from those of its skeleton"):

@@ -205,7 +205,9 @@ def test_positions_that_stand_still_are_offsets() -> None:
     assert farthest(positions(motion), positions(converted)) == 0
     values = values.copy()
     values[2, 4] = 0.5
-    with pytest.raises(MotionError, match="joint 'knee' has position channels that change"):
+    with pytest.raises(
+        MotionError, match="joint 'knee' moves relative to its parent, which ASF cannot express"
+    ):
         mcz.convert(Motion(Skeleton(joints), (Signal(values),)), "amc")
 
 
@@ -238,7 +240,7 @@ def mcz_bvh(rows: list[str]) -> bytes:
 
 def test_refusals() -> None:
     amc, bvh, markers = WALKS["amc"], WALKS["bvh"], WALKS["c3d"]
-    with pytest.raises(OptionError, match="no conversion to 'fbx'"):
+    with pytest.raises(OptionError, match="cannot convert to 'fbx'; the formats are"):
         mcz.convert(amc, "fbx")
     for to in ("bvh", "amc"):
         with pytest.raises(MotionError, match="markers have no skeleton"):
@@ -257,7 +259,7 @@ def test_refusals() -> None:
         mcz.convert(replace(bvh, skeleton=two), "amc")
     smile = Joint("face", 0, channels=(Channel("", "smile"),))
     odd = Skeleton((Joint("hips", channels=POSITION), smile))
-    with pytest.raises(MotionError, match="no channel 'smile'"):
+    with pytest.raises(MotionError, match="ASF cannot hold channel 'smile' of joint"):
         mcz.convert(Motion(odd, (Signal(np.zeros((1, 4))),)), "amc")
 
 
@@ -322,5 +324,7 @@ def test_real_bvh_clips(data: Path, name: str) -> None:
 @pytest.mark.real
 def test_real_refusal(data: Path) -> None:
     motion = mcz.read(data / "other/bandai-namco/dataset-2_run_normal_016.bvh")
-    with pytest.raises(MotionError, match="'Hips' has position channels that change"):
+    with pytest.raises(
+        MotionError, match="joint 'Hips' moves relative to its parent, which ASF cannot express"
+    ):
         mcz.convert(motion, "amc")

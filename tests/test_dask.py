@@ -137,7 +137,7 @@ def test_sources_from_a_store(
         assert failed[0].startswith("memory://takes/more/broken.bvh: ")
         with pytest.raises(mcz.ExistsError):
             pack("memory://takes", "memory://out/all.mcz", Client())
-        with pytest.raises(mcz.OptionError, match="no file is below it"):
+        with pytest.raises(mcz.OptionError, match="the folder contains no file"):
             pack("memory://nothing", tmp_path / "x.mcz", Client())
     finally:
         store.rm("/takes", recursive=True)

@@ -107,7 +107,9 @@ def test_whole_clips(archive: Path) -> None:
     assert [len(item["root"]) for item in data] == list(LENGTHS)
     assert data[-1]["channels"].dtype == np.float32
     np.testing.assert_allclose(data[3]["channels"], motions(archive)[3].values, rtol=1e-6)
-    with pytest.raises(mcz.OptionError, match="give a window"):
+    with pytest.raises(
+        mcz.OptionError, match="whole clips differ in length, so they cannot be batched"
+    ):
         data[0:2]
     assert "4 whole clips of 4 clips: channels, root" in repr(data)
 
@@ -262,18 +264,22 @@ def test_clips_that_do_not_go_together(odd: Path) -> None:
 def test_what_is_asked_for_wrongly(archive: Path, samples: Path) -> None:
     for words, arguments in {
         "no field or signal 'rot6' among .*did you mean 'rot6d'": {"fields": "rot6"},
-        "each once": {"fields": "root,root"},
-        "window of 0": {"window": 0},
-        "stride of 5 frames, of windows of None": {"stride": 5},
-        "dtype int8": {"dtype": "int8"},
-        "a cache of 'much'": {"cache": "much"},
+        "none twice": {"fields": "root,root"},
+        "window is 0 frames; it must be at least 1": {"window": 0},
+        "stride is 5 frames, which does not fit windows of None": {"stride": 5},
+        "dtype is int8": {"dtype": "int8"},
+        "it must be a number of bytes, or a string such as '64 MB'": {"cache": "much"},
         "no clip of at least 9999 frames": {"window": 9999},
     }.items():
         with pytest.raises(mcz.OptionError, match=words):
             mcz.dataset(archive, **arguments)
-    with pytest.raises(mcz.OptionError, match="mcz pack makes one"):
+    with pytest.raises(
+        mcz.OptionError, match="a data set reads only .mcz files; make one with mcz pack"
+    ):
         mcz.dataset(samples / "walk.bvh")
-    with pytest.raises(mcz.OptionError, match=r"without \.mcz files"):
+    with pytest.raises(
+        mcz.OptionError, match=r"the folder contains no .mcz file; make one with mcz pack"
+    ):
         mcz.dataset(samples)
     with pytest.raises(mcz.OptionError, match="size is 0"):
         mcz.dataset(archive).batches(0)
@@ -291,8 +297,8 @@ def test_parts_share_no_subject(archive: Path) -> None:
     by_clip = data.split({"a": 0.25, "b": 0.25, "c": 0.25, "d": 0.25}, by="clip")
     assert [len(part.members) for part in by_clip.values()] == [1] * 4
     for words, arguments in {
-        "say no 'session'": {"by": "session"},
-        "no group that its name matches": {"pattern": "^x(.)"},
+        "have no 'session'": {"by": "session"},
+        "captures no group in its name": {"pattern": "^x(.)"},
         "pattern '\\('": {"pattern": "("},
     }.items():
         with pytest.raises(mcz.OptionError, match=words):
@@ -300,7 +306,7 @@ def test_parts_share_no_subject(archive: Path) -> None:
     for wrong in ({}, {"a": 0.5}, {"a": 1.5, "b": -0.5}):
         with pytest.raises(mcz.OptionError, match="add up to 1"):
             data.split(wrong)
-    with pytest.raises(mcz.OptionError, match="3 subjects or the like for 4 parts"):
+    with pytest.raises(mcz.OptionError, match="cannot fill 4 parts"):
         data.split(dict.fromkeys("abcd", 0.25))
 
 

@@ -148,7 +148,7 @@ def test_a_small_file_is_for_embedded_readers(tmp_path: Path) -> None:
         assert all(row.header.n_frames <= 1024 for row in rows)
         assert not {chunk.type for chunk in chunks} & {b"INDX", b"COPY", b"MODL"}
     for codec in ("best", "mrdwt"):
-        with pytest.raises(mcz.LimitError, match="small has raw and fast"):
+        with pytest.raises(mcz.LimitError, match="small allows only codecs raw and fast"):
             mcz.write(motion, path, codec, force=True, profile="small")
     with pytest.raises(mcz.OptionError, match="is not small, base or large"):
         mcz.write(motion, path, profile="tiny", force=True)

@@ -146,7 +146,7 @@ def test_a_codec_that_is_unknown_is_not_called_lossless(archive: Path) -> None:
         ("metadata.subjct == 5", "did you mean 'metadata.subject' or 'metadata.rights'"),
         ("zzzz is missing", r"known are bytes, codec, .* x-name, x-session \(--> zzzz"),
         ("n_frames = 5", "column 10: .* write =="),
-        (5, "where is 5, neither a text nor a function"),
+        (5, "where is 5; it must be a string or a function of a clip"),
     ],
 )
 def test_what_cannot_be_found(archive: Path, where: object, said: str) -> None:

@@ -51,7 +51,7 @@ def test_a_file_replaced_while_it_grows(folder: Path) -> None:
     mcz.encode(folder / "two.bvh", folder / "b.mcz")
     wanted = (folder / "b.mcz").read_bytes()
     with (
-        pytest.raises(mcz.AccessError, match="replaced by another file"),
+        pytest.raises(mcz.AccessError, match="another file replaced it"),
         growing(path, salvage=False, force=False) as growth,
     ):
         growth.added.write(b"x")
@@ -153,15 +153,15 @@ def test_equal_names(folder: Path) -> None:
     other = folder / "d/one.bvh"
     other.write_text(bvh("9.75", "2.5"))
     before = path.read_bytes()
-    with pytest.raises(mcz.SourceError, match=r"already restores another 'one\.bvh'"):
+    with pytest.raises(mcz.SourceError, match=r"already has a source file 'one\.bvh'"):
         mcz.append([other], path)
-    with pytest.raises(mcz.SourceError, match="already restores"):
+    with pytest.raises(mcz.SourceError, match="the archive already has a source file"):
         mcz.append([folder / "two.bvh", folder / "d/one.bvh"], path)
     assert path.read_bytes() == before
     assert results(mcz.append([folder / "one.bvh"], path)) == {"one.bvh": "present"}
     assert path.read_bytes() == before
     assert results(mcz.append([other], path, root=folder)) == {"d/one.bvh": "parsed"}
-    with pytest.raises(mcz.OptionError, match="does not lie below"):
+    with pytest.raises(mcz.OptionError, match="is not below"):
         mcz.append([folder / "two.bvh"], path, root=folder / "d")
     assert not mcz.unpack(path, folder / "out").failures
     for name in ("one.bvh", "d/one.bvh"):
@@ -200,9 +200,9 @@ BAD_NAME = os.fsdecode(b"bad\xff.bvh")
 def test_names_that_are_not_utf8(folder: Path) -> None:
     bad = folder / BAD_NAME
     bad.write_text(bvh("7.5", "2.5"))
-    with pytest.raises(mcz.MotionError, match=r"bad\\xff\.bvh' is not UTF-8"):
+    with pytest.raises(mcz.MotionError, match=r"bad.*bvh' is not valid UTF-8; rename the file"):
         mcz.encode(bad, folder / "b.mcz")
-    with pytest.raises(mcz.SourceError, match="not UTF-8"):
+    with pytest.raises(mcz.SourceError, match="not valid UTF-8"):
         mcz.append([bad], folder / "a.mcz")
     report = mcz.pack(folder, folder / "all.mcz")
     assert [outcome.path for outcome in report.failures] == [BAD_NAME]

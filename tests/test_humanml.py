@@ -158,7 +158,10 @@ def test_wrong_arguments() -> None:
     for places in (np.zeros((5, 21, 3)), np.zeros((1, 22, 3)), np.zeros((22, 3))):
         with pytest.raises(mcz.MotionError, match="22 joints, 3"):
             mcz.humanml3d(places)
-    with pytest.raises(mcz.OptionError, match="22 lengths above 0"):
+    with pytest.raises(
+        mcz.OptionError,
+        match="bone_lengths must be 22 lengths, all above 0 except that of the root",
+    ):
         mcz.humanml3d(walk(3), bone_lengths=np.zeros(22))
     with pytest.raises(mcz.MotionError, match="263 numbers"):
         mcz.humanml3d_positions(np.zeros((5, 262)))

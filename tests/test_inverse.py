@@ -248,18 +248,16 @@ def test_noise_is_not_followed_by_what_it_hardly_shows() -> None:
 def test_what_does_not_fit() -> None:
     walk = WALKS["amc"]
     skeleton, points = walk.skeleton, positions_of(walk.skeleton, walk.values[:2])
-    with pytest.raises(
-        MotionError, match=r"has 31 points, and their positions are of shape \(2, 30"
-    ):
+    with pytest.raises(MotionError, match=r"has 31 points, so positions must have shape"):
         solve_ik(skeleton, points[:, 1:])
     with pytest.raises(MotionError, match="has 93 virtual markers"):
         solve_ik(skeleton, points, points)
     markers = points_and_markers_of(skeleton, walk.values[:2])[1]
-    with pytest.raises(MotionError, match="2 frames of points, 1 of virtual markers"):
+    with pytest.raises(MotionError, match="2 frames of points, but 1 of virtual markers"):
         solve_ik(skeleton, points, markers[:1])
-    with pytest.raises(OptionError, match="length unit is unknown"):
+    with pytest.raises(OptionError, match="length unit .*is unknown"):
         solve_ik(replace(skeleton, unit_cm=None), points, markers)
-    with pytest.raises(MotionError, match="angle unit is unknown"):
+    with pytest.raises(MotionError, match="angle unit .*is unknown"):
         solve_ik(replace(skeleton, angle_unit=""), points)
 
 
@@ -286,5 +284,5 @@ def test_places_beyond_all_bounds_are_refused() -> None:
     base = WALKS["bvh"].skeleton
     motion = mcz.in_positions(WALKS["bvh"])
     motion.signals[0].values[1, 4] = -1e301
-    with pytest.raises(MotionError, match=r"frame 1, .* is at -1e\+301, too far off"):
+    with pytest.raises(MotionError, match=r"301 is too far away for inverse kinematics"):
         mcz.from_positions(motion, base)

@@ -179,7 +179,7 @@ def test_processes_give_the_same(folder: Path, tmp_path: Path) -> None:
     assert outcomes(mcz.pack(folder, two, jobs=2)) == wanted
     assert two.read_bytes() == one.read_bytes()
     assert run("verify", two, "--jobs", "2") == 0
-    with pytest.raises(mcz.OptionError, match="jobs: 0, not at least 1"):
+    with pytest.raises(mcz.OptionError, match="jobs is 0; it must be at least 1"):
         mcz.verify(one, jobs=0)
 
 
@@ -279,7 +279,7 @@ with Pool(2) as pool:
 """
 
 
-@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.skipif(os.name == "nt", reason="the numbers of frames of its signals differ: POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_no_process_stays_behind(number: int) -> None:
     started = subprocess.Popen(

@@ -263,14 +263,14 @@ def test_angle_units(angle_unit: str) -> None:
     if angle_unit:
         agree(positions_of(skeleton, values), np.array([[[-2.0, 0, 0]]]), 2.0)
     else:
-        with pytest.raises(MotionError, match="angle unit is unknown"):
+        with pytest.raises(MotionError, match="angle unit .*is unknown"):
             positions_of(skeleton, values)
 
 
 def test_scalars_alone_place_nothing() -> None:
     """An AMC without its ASF."""
     skeleton = Skeleton((Joint("root", channels=(Channel("", "1"),)),), intrinsic=False)
-    with pytest.raises(MotionError, match="plain scalars, which place no joint"):
+    with pytest.raises(MotionError, match="channels are plain scalars, which do not move joints"):
         positions_of(skeleton, np.zeros((1, 1)))
 
 

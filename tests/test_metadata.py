@@ -219,7 +219,7 @@ def test_a_rate_for_those_that_have_none(tmp_path: Path) -> None:
     with mcz.open(tmp_path / "a.mcz") as file:
         assert file.clips["walk"].frame_rate == 120
         assert file.clips["walk"].source_bytes() == (tmp_path / "takes/walk.amc").read_bytes()
-    with pytest.raises(mcz.OptionError, match="its source states the rate"):
+    with pytest.raises(mcz.OptionError, match="its source format states the frame rate"):
         mcz.set_rate(tmp_path / "a.mcz", 100, ["walk.bvh"], force=True)
     with pytest.raises(mcz.OptionError, match="has 120 frames a second"):
         mcz.set_rate(tmp_path / "a.mcz", 100, ["walk"])
@@ -247,11 +247,11 @@ def test_columns_make_up_a_name(archive: Path) -> None:
     table = archive.parent / "t.csv"
     table.write_text("what,kind,fps\nwalk,bvh,120\nrun,bvh,120\n")
     with mcz.open(archive) as file:
-        with pytest.raises(mcz.OptionError, match="no column clip, name, path, file"):
+        with pytest.raises(mcz.OptionError, match="no column is called clip, name, path, file"):
             from_table(table, file)
-        with pytest.raises(mcz.OptionError, match="no clip for 1 of 2 rows: run.bvh"):
+        with pytest.raises(mcz.OptionError, match="1 of 2 rows match no clip: run.bvh"):
             from_table(table, file, match="{what}.{kind}", take=[])
-        with pytest.raises(mcz.OptionError, match="no key of the metadata"):
+        with pytest.raises(mcz.OptionError, match="not metadata keys"):
             from_table(table, file, match="{what}.{kind}", skip_unknown=True)
         for bad in ("{what.__class__}", "{nothing}", "{what", "{what:d}"):
             with pytest.raises(mcz.OptionError):
@@ -267,7 +267,7 @@ def test_columns_are_keys_by_what_is_said(archive: Path) -> None:
     with mcz.open(archive) as file:
         said, _ = from_table(table, file, match="walk{Trial #}", take=take)
         assert said == {"walk": {"description": "a walk", "date": "2014"}}
-        with pytest.raises(mcz.OptionError, match="no column 'What'; there are Trial #"):
+        with pytest.raises(mcz.OptionError, match="no column 'What'; the columns are Trial #"):
             from_table(table, file, match="walk{Trial #}", take=["description=What"])
         with pytest.raises(mcz.OptionError, match="such as description=What they do"):
             from_table(table, file, match="walk{Trial #}")

@@ -158,7 +158,7 @@ def test_other_extents_are_refused() -> None:
     with pytest.raises(MotionError, match="50 frames.*40 frames"):
         mcz.compare(smooth(50), smooth(40))
     double = replace(smooth(50), signals=(replace(smooth(50).signals[0], samples_per_frame=2),))
-    with pytest.raises(MotionError, match="25 frames of 2 rows"):
+    with pytest.raises(MotionError, match="has 25 frames of 2 rows"):
         mcz.compare(smooth(25), double)
 
 

@@ -163,8 +163,8 @@ def test_pairs_say_what_names_do_not() -> None:
     ]
     assert pairs_of("a", "b", pairs={"a": "b", "b": "a"}) == ["b", "a"]
     for pairs, reason in (
-        ({"a": "x"}, "no joint 'x' among"),
-        ({"a": "b", "b": "c"}, "'b' or 'c' has two counterparts"),
+        ({"a": "x"}, "no joint 'x'; the joints are"),
+        ({"a": "b", "b": "c"}, "mirror: pairs: 'b' or 'c' has more than one counterpart"),
         ({"a": "LeftArm"}, "'LeftArm' would be the counterpart of 'RightArm' and of 'a'"),
     ):
         with pytest.raises(OptionError, match=reason):
@@ -173,17 +173,19 @@ def test_pairs_say_what_names_do_not() -> None:
 
 def test_what_has_no_mirror_image_is_refused() -> None:
     motion = smooth()
-    with pytest.raises(OptionError, match="axis 'w' is not one of x, y, z"):
+    with pytest.raises(OptionError, match="mirror: axis is 'w'; it must be one of x, y, z"):
         mcz.mirror(motion, "w")
     beside = Signal(np.zeros((50, 1)), name="residuals", channels=(Channel("", "a"),))
-    with pytest.raises(MotionError, match="how its signals residuals look"):
+    with pytest.raises(MotionError, match="signals residuals cannot be mirrored"):
         mcz.mirror(replace(motion, signals=(*motion.signals, beside)))
     scalars = (Joint("root", channels=(Channel("", "smile"), Channel("rx"))),)
     with pytest.raises(MotionError, match="joint 'root' has plain scalars"):
         mcz.mirror(Motion(Skeleton(scalars), (Signal(np.zeros((2, 2))),)))
     crooked = (Joint("root"), Joint("TLS", 0), Joint("TRS", 0), Joint("l_a", 1), Joint("r_a", 2))
     bent = Motion(Skeleton(crooked), (Signal(np.zeros((2, 0))),))
-    with pytest.raises(OptionError, match="'l_a' hangs on 'TLS' and its counterpart 'r_a' on"):
+    with pytest.raises(
+        OptionError, match="mirror: 'l_a' is a child of 'TLS' and its counterpart 'r_a' of"
+    ):
         mcz.mirror(bent)
     mcz.mirror(bent, pairs={"TLS": "TRS"})
 

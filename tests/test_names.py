@@ -58,8 +58,8 @@ def test_a_clip_is_found(archive: Path, name: str, clip: str) -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("walk", "'walk' may be a/walk, b/walk; choose one"),
-        ("walk.bvh", "may be a/walk, b/walk; choose one"),
+        ("walk", "'walk' is ambiguous: a/walk, b/walk; choose one"),
+        ("walk.bvh", "is ambiguous: a/walk, b/walk; choose one"),
         ("a/wlak", "did you mean 'a/walk'"),
         ("RUN", "did you mean 'run'"),
         ("xyzzy", "there are: a/run, a/walk, b/copy, b/jump.v2, b/walk"),
@@ -200,7 +200,9 @@ def test_one_joint_by_its_name(clip: mcz.Clip, tmp_path: Path) -> None:
 
 def test_a_joint_of_nearly_this_name_is_suggested(samples: Path) -> None:
     skeleton = mcz.read(samples / "walk.bvh").skeleton
-    with pytest.raises(mcz.MotionError, match=r"no joint 'hed' among Hips, .*did you mean 'Head'"):
+    with pytest.raises(
+        mcz.MotionError, match=r"no joint 'hed'; the joints are Hips, .*did you mean 'Head'"
+    ):
         skeleton.find("hed")
     many = replace(skeleton, joints=tuple(mcz.Joint(f"j{n}") for n in range(500)))
     with pytest.raises(mcz.MotionError, match=r"among j0, .*j39 \.\.\. \(500 in all\)") as raised:

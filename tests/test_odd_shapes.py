@@ -160,7 +160,7 @@ def test_every_shape_works_or_is_refused(use: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["two samples", "three samples of markers"])
 def test_several_samples_are_no_poses(name: str) -> None:
     for use in (mcz.positions, mcz.rotations, mcz.velocities, mcz.to_glb, mcz.to_usda):
-        with pytest.raises(mcz.MotionError, match="samples a frame are not one pose a frame"):
+        with pytest.raises(mcz.MotionError, match="one pose a frame is needed, but the signal has"):
             use(SHAPES[name])
     table = mcz.to_xarray(SHAPES[name])
     assert table["channels"].shape == SHAPES[name].signals[0].values.shape

@@ -314,12 +314,12 @@ def test_any_numbers_are_plotted_or_refused(
         ("a.gif", None, {}, "by its suffix"),
         ("a.png", "none", {}, "one of channels"),
         ("a.png", "error", {}, "the two that are compared"),
-        ("a.png", "bytes", {}, "a clip of an .mcz"),
-        ("a.png", "bytes", {"joint": "hips"}, "of all joints"),
+        ("a.png", "bytes", {}, "a plot of bytes needs an .mcz"),
+        ("a.png", "bytes", {"joint": "hips"}, "shows all joints, so"),
         ("a.png", None, {"size": (9, 9)}, "64 to 4096"),
         ("a.png", None, {"theme": "x"}, "light, dark"),
         ("a.png", None, {"frames": (3, 99)}, "0 to 12"),
-        ("a.png", "rate-distortion", {"codecs": ["raw"]}, "no rate to vary"),
+        ("a.png", "rate-distortion", {"codecs": ["raw"]}, "no parameter that varies its rate"),
     ],
 )
 def test_options_are_checked(

@@ -62,7 +62,7 @@ def test_the_coarsest_resolution_where_no_frame_is_exact() -> None:
 def test_one_resolution_has_no_preview() -> None:
     with (
         mcz.open(write_bytes(smooth(30), "fast")) as file,
-        pytest.raises(OptionError, match="codec fast has stored it in one resolution"),
+        pytest.raises(OptionError, match="codec fast stored it at a single resolution"),
     ):
         file.only_clip().preview()
 
@@ -218,4 +218,4 @@ def test_command_says_that_there_is_none(
     target = tmp_path / "walk.mcz"
     mcz.encode(samples / "walk.bvh", target)
     assert run("decode", target, "--preview", "--to", "csv") == 2
-    assert "one resolution" in capsys.readouterr().err
+    assert "stored it at a single resolution, so it has no preview" in capsys.readouterr().err

@@ -62,7 +62,7 @@ def test_a_clip_that_is_gone_says_so(path: Path) -> None:
     with mcz.open(path) as file:
         data = pickle.dumps(file.only_clip())
     mcz.write(replace(smooth(5), name="other"), path, force=True)
-    with pytest.raises(mcz.OptionError, match="'smooth' is no longer there"):
+    with pytest.raises(mcz.OptionError, match="clip 'smooth' no longer exists"):
         pickle.loads(data)
 
 

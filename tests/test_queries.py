@@ -137,8 +137,8 @@ def test_what_is_true(text: str, answer: bool | None) -> None:
 
 
 REFUSED = [
-    ("", "the text is empty"),
-    (" \n", "the text is empty"),
+    ("", "where: the query is empty"),
+    (" \n", "where: the query is empty"),
     ("lossless", "column 9: expected a comparison such as lossless == true, not the end"),
     ("'a'", "column 4: expected a comparison such as 'a' == ..., not the end"),
     ("n_frames -5", "column 10: expected a comparison such as n_frames == true, not '-5'"),
@@ -168,7 +168,7 @@ REFUSED = [
     ("a ~ 'b'", "column 3: '~' means nothing here"),
     ("a == 1 -- comment", "column 8: '-' means nothing here"),
     ("(" * 65 + "a == 1" + ")" * 65, "column 65: more than 64 levels"),
-    ("not " * 2000 + "a", "OptionError: where: 8001 characters, 4096 at most"),
+    ("not " * 2000 + "a", "OptionError: where: 8001 characters exceed the limit of 4096"),
     ("not " * 1000 + "a", "column 257: more than 64 levels of ( and not"),
 ]
 
@@ -221,7 +221,7 @@ def test_a_query_can_be_pickled() -> None:
 
 
 def test_what_is_no_text() -> None:
-    with pytest.raises(OptionError, match="where: '5' is not a text"):
+    with pytest.raises(OptionError, match="where: '5' is not a string"):
         Query(5)  # type: ignore[arg-type]
 
 

@@ -111,7 +111,7 @@ def test_pack_uses_a_rate_for_files_that_state_none(tmp_path: Path) -> None:
     with mcz.open(target) as file:
         assert {clip.name: clip.frame_rate for clip in file} == {"walk": 120, "run": 60}
     assert (
-        "it states 60 frames a second, 120 are asked for; force_rate=True takes what is asked for"
+        "it states 60 frames a second, 120 are asked for; force_rate=True overrides it"
         in notes["run.bvh"]
     )
     assert not notes["walk.amc"]

@@ -56,7 +56,7 @@ def columns(held: Any, *joints: str) -> list[int]:
 @pytest.mark.parametrize("codec", CODECS)
 def test_joints_are_extracted(codec: str) -> None:
     whole, out = write_bytes([motion()], codec), io.BytesIO()
-    with pytest.raises(OptionError, match="coded in one group .* recode"):
+    with pytest.raises(OptionError, match="coded together .* recode"):
         mcz.extract(whole, io.BytesIO(), joints=["hips"])
     found = mcz.extract(whole, out, joints=["knee", "hips"], frames=(5, 30), recode=True)
     before, after = clip(whole), clip(out.getvalue())
@@ -81,7 +81,7 @@ def test_a_joint_is_replaced(codec: str) -> None:
     before = clip(whole)
     own = columns(before, "knee")
     given = before.values[:, own] + 0.5
-    with pytest.raises(OptionError, match="in one group with .* recode"):
+    with pytest.raises(OptionError, match="together with .* recode"):
         mcz.replace(whole, "one", "knee", given, io.BytesIO())
     found = mcz.replace(whole, "one", "knee", given, out, recode=True)
     after = clip(out.getvalue())
@@ -110,7 +110,7 @@ def test_a_lossless_clip_is_coded_anew_without_an_error() -> None:
     out = io.BytesIO()
     mcz.write(given, out, codec="best", segment_frames=15)
     data, part, edited = out.getvalue(), io.BytesIO(), io.BytesIO()
-    with pytest.raises(OptionError, match=r"with those of spine; recode=True encodes them again$"):
+    with pytest.raises(OptionError, match=r"with those of spine; recode=True re-encodes them$"):
         mcz.extract(data, io.BytesIO(), joints=["hips"])
     found = mcz.extract(data, part, joints=["hips", "knee"], frames=(2, 20), recode=True)
     own = columns(clip(data), "hips", "knee")
@@ -154,7 +154,9 @@ def test_the_source_of_a_replaced_joint_follows(samples: Path, tmp_path: Path) -
 def test_what_cannot_be_coded_anew() -> None:
     out = io.BytesIO()
     mcz.write(motion(), out, codec="posewave", step=0.01, lossless="knee")
-    with pytest.raises(OptionError, match="are coded exactly, and would not be any more"):
+    with pytest.raises(
+        OptionError, match="are coded exactly, and re-encoding would not keep them exact"
+    ):
         mcz.extract(out.getvalue(), io.BytesIO(), joints=["spine"], recode=True)
     lossless = io.BytesIO()
     mcz.write(motion(), lossless)
@@ -237,7 +239,7 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole, part, table = tmp_path / "a.mcz", tmp_path / "b.mcz", tmp_path / "knee.csv"
     whole.write_bytes(write_bytes([motion()], "posewave"))
     assert run("extract", whole, part, "--joints", "knee") == 2
-    assert "--recode encodes them again" in capsys.readouterr().err
+    assert "--recode re-encodes them" in capsys.readouterr().err
     assert not part.exists()
     assert run("extract", whole, part, "--joints", "knee", "--recode") == 0
     assert "joints knee, coded anew, data" in capsys.readouterr().out

@@ -417,7 +417,7 @@ def file_contents(data: bytes) -> set[tuple[str, bytes]]:
 def test_one_byte_more_is_left_out(small: tuple[bytes, bytes], tmp_path: Path) -> None:
     report, data = restore_file(small[0] + b"?", tmp_path)
     assert (report.restored, report.lost, data) == (True, [], small[0])
-    assert any("1 bytes behind its end" in line for line in report.damage)
+    assert any("1 bytes after its end" in line for line in report.damage)
 
 
 @settings(max_examples=amount(60, 20), deadline=None, suppress_health_check=SHARED)

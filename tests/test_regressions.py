@@ -374,5 +374,5 @@ def test_amc_that_arrives_with_zeros_behind_its_first_frame_number() -> None:
 def test_amc_that_arrives_with_nothing_in_its_first_frame() -> None:
     """Later frames have no bones then either, as they would be others in each frame."""
     lines = [b":DEGREES\n", b"1\n", b"2\n", b"knee 2\n"]
-    with pytest.raises(mcz.SourceError, match="'knee', which the first frame does not have"):
+    with pytest.raises(mcz.SourceError, match="bone 'knee' is not in the first frame"):
         list(FORMATS["amc"].arrive(iter(lines), BONES).frames)  # type: ignore[misc]

@@ -305,7 +305,7 @@ def test_a_frame_far_away_spoils_nothing(tmp_path: Path) -> None:
         ("a.png", {"sheet": 0}, "1 to 400"),
         ("a.png", {"sheet": 400, "size": (300, 300)}, "too small"),
         ("a.gif", {"sheet": 3}, "no film"),
-        ("a.gif", {"fps": 0}, "pictures a second"),
+        ("a.gif", {"fps": 0}, "it must be above 0 and at most"),
         ("a.gif", {"speed": float("nan")}, "above 0"),
         ("a.gif", {"speed": 1e-12}, "below 1,000,000"),
         ("a.png", {"frames": (5, 99)}, "0 to 8"),
@@ -353,7 +353,7 @@ def test_the_command(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     document = json.loads(printed)
     assert (code, document["width"], document["height"]) == (0, 200, 100)
     assert document["bytes"] == out.stat().st_size
-    assert "its up axis is unknown: y up assumed; give the axis (--up)" in said
+    assert "its up axis is unknown: y up assumed; set the up axis (--up)" in said
     assert "frame rate" not in said  # of a still
     code, printed, _ = call(samples / "walk.bvh", "-o", "memory://a.png", "--size", "64")
     assert (code, "64 x 64 pixels" in printed) == (0, True)  # a store has nothing on the disk

@@ -62,8 +62,8 @@ def test_roles_come_back_under_any_names() -> None:
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ((beside([0, 1, 2, 3], role="motion"),), "not its first"),
-        ((beside([0, 1, 2, 3], role="times"),) * 2, "two signals of times"),
+        ((beside([0, 1, 2, 3], role="motion"),), "only the first signal can be a motion"),
+        ((beside([0, 1, 2, 3], role="times"),) * 2, "more than one signal of times"),
         ((beside([0, 1, 1, 0], role="times"),), "decrease at frame 3"),
         ((beside([0, 1, np.nan, 3], role="times"),), "frame 2 is unknown"),
         ((beside([0, 1, 2, 3], "min", role="times"),), "unit 'min'"),

@@ -68,7 +68,7 @@ def test_unpack_leaves_its_folder_with_no_names(
         monkeypatch.setattr(unpacking, "files_of", lambda file, clips, one=stored: [one])
         report = mcz.unpack(archive, tmp_path / names, names=names)
         assert [o.result for o in report.outcomes] == ["failed"]
-        assert "not relative and plain" in report.outcomes[0].message
+        assert "not a plain relative path" in report.outcomes[0].message
 
 
 def test_unpack_into_a_folder_that_is_itself_a_link(tmp_path: Path) -> None:
@@ -203,7 +203,7 @@ def test_a_disk_that_folds_names_loses_nothing(
     monkeypatch.setattr(folders.Folder, "write", fold_case)
     report = mcz.unpack(archive, out, force=force)
     assert [o.path for o in report.failures] == ["notes.txt"]
-    assert "names='portable' keeps both" in report.failures[0].message
+    assert "names='portable' writes both" in report.failures[0].message
     assert (out / "NOTES.TXT").read_bytes() == b"0 NOTES.TXT"
 
 

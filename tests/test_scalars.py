@@ -79,7 +79,7 @@ def test_what_is_not_clear_is_refused() -> None:
     angles = np.arange(40) / 7
     values[:, 3:7] = np.column_stack([0 * angles, 0 * angles, np.sin(angles), np.cos(angles)])
     values[:, 7] = 0.0
-    with pytest.raises(OptionError, match="may be a quaternion, or columns beside them"):
+    with pytest.raises(OptionError, match="may be a quaternion or independent columns"):
         mcz.resample(motion.with_values(values), 50)
     named = robot().with_values(values)
     np.testing.assert_allclose(norms(mcz.resample(named, 50)), 1, atol=1e-12)

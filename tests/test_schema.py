@@ -225,10 +225,10 @@ def test_fields_are_read() -> None:
         (b"", TruncatedError, "tree: flags: stream read less than specified amount, expected 1, "),
         (b"\2", FormatError, "tree: flags: 2 is not allowed"),
         (b"\1a", TruncatedError, "tree: label: stream read less than specified amount, expected 2"),
-        (b"\0\3", FormatError, "tree: leaves: 3 are more than 2"),
+        (b"\0\3", FormatError, "tree: leaves: 3 exceed the limit of 2"),
         (b"\0\2\1\0", FormatError, "tree: leaves.1.size: 0 is not allowed"),
         (b"\0\1\x80", TruncatedError, "tree: leaves.0.size: "),
-        (b"\0\0\0\0", FormatError, "tree: 2 bytes behind its end"),
+        (b"\0\0\0\0", FormatError, "tree: 2 bytes follow its end"),
     ],
 )
 def test_messages_say_where(data: bytes, error: type[MczError], message: str) -> None:
@@ -239,7 +239,7 @@ def test_messages_say_where(data: bytes, error: type[MczError], message: str) ->
 
 
 def test_items_are_counted_before_they_are_read() -> None:
-    with pytest.raises(LimitError, match="tree: leaves: leaves: 2 are over the limit, which leave"):
+    with pytest.raises(LimitError, match="tree: leaves: leaves: 2 exceed the limit, which leaves"):
         parse(Tree, b"\0\2", "tree", {"leaves": 1})
     assert len(parse(Tree, b"\0\1\1", "tree", {"leaves": 1}).leaves) == 1
 
@@ -252,7 +252,7 @@ def test_items_are_counted_before_they_are_read() -> None:
         ({"flags": 3, "label": b"ab", "weight": [1]}, "tree: weight: expected 2 elements, found 1"),
         ({"flags": 0, "leaves": [{"size": 1}, {"size": 0}]}, "tree: leaves.1.size: 0 is not allow"),
         ({"flags": 0, "leaves": [{"size": 2**53}]}, f"tree: {2**53} is not between"),
-        ({"flags": 0, "leaves": [{"size": 1}] * 3}, "tree: leaves: 3 are more than 2"),
+        ({"flags": 0, "leaves": [{"size": 1}] * 3}, "tree: leaves: 3 exceed the limit of 2"),
         ({"flags": 0, "leaves": [5]}, "tree: AttributeError: 'int' object has no attribute 'size'"),
     ],
 )

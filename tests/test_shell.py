@@ -80,11 +80,11 @@ def test_axes_of_an_asf_do_not_turn_the_shell() -> None:
 
 @pytest.mark.parametrize("radius", [0.0, -1.0, np.inf, np.nan])
 def test_a_radius_is_a_length(radius: float) -> None:
-    with pytest.raises(OptionError, match="radius is a length above 0"):
+    with pytest.raises(OptionError, match="the radius of the shell is"):
         mcz.compare(smooth(), smooth(), shell_cm=radius)
-    with pytest.raises(OptionError, match="radius is a length above 0"):
+    with pytest.raises(OptionError, match="the radius of the shell is"):
         mcz.compare(hinge([0.0], ""), hinge([0.0], ""), shell_cm=radius)
-    with pytest.raises(OptionError, match="radius is a length above 0"):
+    with pytest.raises(OptionError, match="the radius of the shell is"):
         shell_points_of(smooth().skeleton, smooth().values, radius)
 
 

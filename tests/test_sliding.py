@@ -102,7 +102,7 @@ def test_contacts_that_are_given() -> None:
     assert named.contacts == mcz.contacts(motion, ["body"])
     nobody = mcz.compare(motion, other, contacts=mcz.Contacts((), (), 300))
     assert (nobody.sliding, nobody.notes) == (None, ())
-    with pytest.raises(MotionError, match="contacts of 299 frames, .* has 300"):
+    with pytest.raises(MotionError, match="contacts have 299 frames, .* has 300"):
         mcz.compare(motion, other, contacts=replace(given_, n_frames=299))
     with pytest.raises(MotionError, match="no joint 'head'"):
         mcz.compare(motion, other, contacts=["head"])
@@ -137,7 +137,7 @@ def test_without_feet_or_unit_there_are_no_contacts() -> None:
     hand = markers("hand", np.zeros((60, 1, 3)))
     comparison = mcz.compare(hand, hand, contacts=True)
     assert comparison.sliding is None
-    assert any("no joint is a foot by its name" in note for note in comparison.notes)
+    assert any("no joint is named like a foot" in note for note in comparison.notes)
     unknown = markers("lfoot", np.zeros((60, 1, 3)), unit_cm=None)
     comparison = mcz.compare(unknown, unknown, contacts=True)
     assert comparison.sliding is None

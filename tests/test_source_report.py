@@ -144,8 +144,8 @@ def test_an_unknown_unit_names_its_option(
 ) -> None:
     arguments = ["encode", str(samples / "walk.bvh"), "-o", str(tmp_path / "a.mcz")]
     assert run(cli, "mcz", [*arguments, "--codec", "mrdwt", "--param", target]) == 2
-    assert "the length unit is unknown; give the unit (--unit)" in capsys.readouterr().err
+    assert "the length unit is unknown; set the unit (--unit)" in capsys.readouterr().err
     bvh = str(samples / "walk.bvh")
     assert run(cli, "mcz", ["diff", bvh, bvh]) == 0
-    text = "the length unit is unknown: no figures in cm; give the unit (--unit)"
+    text = "the length unit is unknown: no figures in cm; set the unit (--unit)"
     assert text in capsys.readouterr().out

@@ -182,11 +182,11 @@ def test_one_basis_a_coordinate() -> None:
 def test_refused_arguments() -> None:
     frames = np.ones((4, 3))
     for kwargs, words in (
-        ({"sparsity": 0}, "sparsity 0 is not 1 to 3"),
-        ({"sparsity": 4}, "sparsity 4 is not 1 to 3"),
-        ({"iterations": -1}, "must not be negative"),
-        ({"growth": -1}, "must not be negative"),
-        ({"start": "fft"}, "'fft' is not one of dct, haar"),
+        ({"sparsity": 0}, "sparsity is 0; it must be 1 to 3"),
+        ({"sparsity": 4}, "sparsity is 4; it must be 1 to 3"),
+        ({"iterations": -1}, "may be negative"),
+        ({"growth": -1}, "may be negative"),
+        ({"start": "fft"}, "start is 'fft'; it must be one of dct, haar"),
         ({"start": np.eye(2)}, r"start has shape \(2, 2\)"),
         ({"start": np.ones((3, 3))}, "not an orthogonal matrix"),
     ):
@@ -310,7 +310,9 @@ def test_the_better_of_several_bases(walk: Motion) -> None:
     for kept, *both in zip(best.learned, one.learned, other.learned, strict=True):
         assert kept in both
         assert kept.objective[-1] == min(learned.objective[-1] for learned in both)
-    with pytest.raises(OptionError, match="other vectors"):
+    with pytest.raises(
+        OptionError, match="bases learned from different vectors cannot be compared"
+    ):
         one.better(replace(recipes[0], every=2).learn(found))
 
 
@@ -342,7 +344,7 @@ def test_train(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ("arguments", "code", "words"),
     [
         (["walk.bvh", "walk.amc"], 1, ["walk.bvh", "walk.amc", "38 and 31 points"]),
-        (["walk.bvh", "--P", "39"], 2, ["walk.bvh", "sparsity 39 is not 1 to 38"]),
+        (["walk.bvh", "--P", "39"], 2, ["walk.bvh", "sparsity is 39; it must be 1 to 38"]),
         (["walk.asf"], 2, ["walk.asf"]),
         (["absent.bvh"], 1, ["absent.bvh: no such file"]),
         (["walk.c3d", "--mirror", "--start", "fft"], 2, ["fft"]),

@@ -64,7 +64,7 @@ def test_other_axes_are_turned_to_y(up: str, turn: tuple[int, int, int]) -> None
 
 
 def test_what_cannot_be_said() -> None:
-    with pytest.raises(OptionError, match="its frame rate is unknown, and USDA states times"):
+    with pytest.raises(OptionError, match="its frame rate is unknown, but USDA must state times"):
         mcz.to_usda(replace(AMC, frame_rate=None))
     values = BVH.values.copy()
     values[3, 7] = np.nan

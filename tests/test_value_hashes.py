@@ -43,9 +43,9 @@ def test_a_whole_signal_is_compared_unless_the_codec_excuses_it(name: str, tmp_p
                 assert len(clip.read()) == 12
                 assert mcz.read(path).n_frames == 12
                 continue
-            with pytest.raises(ChecksumError, match="value hash"):
+            with pytest.raises(ChecksumError, match="the hash of the values is"):
                 clip.read()
-            with pytest.raises(ChecksumError, match="value hash"):
+            with pytest.raises(ChecksumError, match="the hash of the values is"):
                 mcz.read(path, verify=verify)
     assert [problem.heading for problem in mcz.verify(path)] == ["CEND"]
 
@@ -83,7 +83,7 @@ def test_no_command_writes_values_that_are_not_those_hashed(
 
 def test_a_repaired_file_has_no_clip_of_other_values(wrong: Path, tmp_path: Path) -> None:
     report = mcz.repair(wrong, tmp_path / "repaired.mcz")
-    assert report.clips == [] and "value hash" in " ".join(report.lost)
+    assert report.clips == [] and "the hash of the values is" in " ".join(report.lost)
     assert mcz.verify(tmp_path / "repaired.mcz") == []
 
 
@@ -105,7 +105,7 @@ def test_a_faulty_encoder_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     faulty = dataclasses.replace(raw, id=250, name="faulty", encode=encode)
     monkeypatch.setitem(CODECS, "faulty", faulty)
     out = BytesIO()
-    with pytest.raises(ChecksumError, match="decodes other values than it was given"):
+    with pytest.raises(ChecksumError, match="does not decode to the values that it encoded"):
         mcz.write(smooth(12), out, "faulty")
 
 
@@ -123,7 +123,12 @@ def test_the_first_decode_runs_a_known_answer(name: str, monkeypatch: pytest.Mon
 
     monkeypatch.setattr(known_answers, "_proved", set())
     monkeypatch.setitem(CODECS, name, dataclasses.replace(codec, decode=off, earlier={}))
-    with mcz.open(data.getvalue()) as file, pytest.raises(UnsupportedError, match="known answer"):
+    with (
+        mcz.open(data.getvalue()) as file,
+        pytest.raises(
+            UnsupportedError, match="MCZ_LOOPS=interpreted decodes without compiled code"
+        ),
+    ):
         file.only_clip().read((0, 1))
 
 

@@ -118,7 +118,7 @@ def test_other_wavelets_are_inline(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["", "nosuch", "db0", "DB3 ", "morl", "gaus1", "cmor1.5-1.0"])
 def test_unknown_names_are_refused(name: str) -> None:
-    with pytest.raises(OptionError, match="wavelet .*is unknown; registered are haar, db2"):
+    with pytest.raises(OptionError, match="wavelet .*is unknown; the wavelets are haar, db2"):
         by_name(name)
 
 

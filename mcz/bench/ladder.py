@@ -41,7 +41,7 @@ def dial_of(variant: Variant) -> tuple[Dial, Settings]:
     """Raises OptionError where the codec has no dial."""
     codec = codec_by_name(variant.codec)
     if codec.dial is None:
-        raise OptionError(f"codec {variant.codec} has no rate to vary")
+        raise OptionError(f"codec {variant.codec} has no parameter that varies its rate")
     return codec.dial, Settings(codec.dial)
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Figures = Callable[[Path], Iterator[Path]]  # draws into a folder, yields the paths
 
-MISSING = "no plots: matplotlib is not installed (pip install 'mcz[plot]')"
+MISSING = "no plots, because matplotlib is not installed (pip install 'mcz[plot]')"
 MARKS = "osD^vP*X<>"
 PUBLISHED = (0, (4, 2))  # dashes of presets that follow a paper
 PEER = (0, (1, 1.5))

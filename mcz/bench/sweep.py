@@ -228,7 +228,7 @@ def _front(curve: Curve, key: str) -> tuple[Any, Any]:
     return sizes, -negative
 
 
-BETWEEN = "between measured points, straight in logarithms; - where the codec does not reach it"
+BETWEEN = "interpolated between measured points, in logarithms; - where the codec does not reach it"
 
 
 def _at_equal(clip: ClipResult) -> Iterator[Table]:

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 @click.option(
     "--mtimes",
     is_flag=True,
-    help="Keep the time of last change of each file; unpack --mtimes sets it.",
+    help="Keep the modification time of each file; unpack --mtimes restores it.",
 )
 @copies_option("yes")
 @force_option
@@ -123,15 +123,20 @@ def _packing(scheduler: str | None) -> Callable[..., Report]:
     help="Store paths relative to DIR. Default: names without folders.",
 )
 @click.option(
-    "--salvage", is_flag=True, help="Keep whole clips at the end of a file that was cut short."
+    "--salvage",
+    is_flag=True,
+    help="Keep complete clips behind the last valid end of an interrupted file.",
 )
 @click.option(
-    "--force", is_flag=True, help="Drop whole clips at the end of a file that was cut short."
+    "--force",
+    is_flag=True,
+    help="Drop complete clips behind the last valid end of an interrupted file.",
 )
 @click.option(
     "--rename",
     is_flag=True,
-    help="If the name of a clip of an .mcz is taken, put it below the name of its file.",
+    help="If the name of a clip of an .mcz is already used, prefix it with the name of its file: "
+    "day2/walk.",
 )
 @click.option(
     "--skip-identical",
@@ -210,7 +215,9 @@ def append_command(
     help="Handle names that some systems cannot store, or would confuse: write them as stored if "
     "possible, write portable names, or refuse.",
 )
-@click.option("--mtimes", is_flag=True, help="Set files to the time in their clips' metadata.")
+@click.option(
+    "--mtimes", is_flag=True, help="Restore the modification times that pack --mtimes kept."
+)
 @decoded_option
 @force_option
 @threads_option

@@ -30,7 +30,7 @@ PAPERS = "python -m tools.papers"
     "--codecs",
     metavar="A,B",
     help="Compare these codecs, each with its presets; qbc:khan2014 or qbc:delta=40 is that "
-    "alone. Default: all.",
+    "setting alone. Default: all.",
 )
 @click.option("--tables", "paper", hidden=True)  # an internal option of tools/papers
 @click.option("--peers", is_flag=True, help="Add the general compressors that are installed.")
@@ -40,7 +40,7 @@ PAPERS = "python -m tools.papers"
     "--out",
     metavar="DIR",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Write index.html, results.json, report.md and plots into DIR, over earlier ones.",
+    help="Write index.html, results.json, report.md and plots into DIR; overwrite earlier ones.",
 )
 @click.option(
     "--jobs",
@@ -66,9 +66,9 @@ def bench_command(
 
     Without CLIPS, use a generated walk.
 
-    Print sizes by three numerators, errors of channels and positions, comparisons at equal error
-    and at equal size, Bjontegaard deltas, speed relative to parsing the text, and memory. Results
-    are cached in the user's cache folder; speeds are measured one at a time.
+    Print compression ratios over three numerators, errors of channels and positions, comparisons
+    at equal error and at equal size, Bjontegaard deltas, speed relative to parsing the text, and
+    memory. Results are cached in the user's cache folder; speeds are measured one at a time.
     """
     from mcz.bench.report import bench
     from mcz.bench.tasks import Cache, Runner, default_folder

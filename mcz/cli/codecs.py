@@ -119,7 +119,7 @@ AXES = "xyz"
     metavar="N",
     type=click.IntRange(0, 100_000),
     default=300,
-    help="Iterate at most N times, less if nothing is gained. Default: 300.",
+    help="Iterate at most N times, fewer if nothing is gained. Default: 300.",
 )
 @click.option(
     "--growth",

@@ -90,7 +90,7 @@ class JsonRefused(Failure):
 
 
 WIDEST_CELL = 48  # characters that the columns of a table are aligned to
-OUT_OF_MEMORY = "out of memory: this takes more than the process may have"
+OUT_OF_MEMORY = "out of memory: the process may not use as much as this needs"
 
 
 def run(command: click.Command, prog: str, arguments: Sequence[str] | None = None) -> int:
@@ -315,7 +315,7 @@ def damage_of(path: str, damage: Sequence[str]) -> Exit:
 
 def exists(path: Path) -> Failure:
     """The error about an existing file that ``--force`` would replace."""
-    return Failure("it exists", Exit.USAGE, path=path, kind="ExistsError", hint=Hint.FORCE)
+    return Failure("already exists", Exit.USAGE, path=path, kind="ExistsError", hint=Hint.FORCE)
 
 
 def check_new(path: Path, force: bool) -> None:

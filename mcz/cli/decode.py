@@ -89,7 +89,7 @@ if TYPE_CHECKING:
 @click.option(
     "--decimate",
     is_flag=True,
-    help="Write only every 2^K-th frame, at the frame rate divided by 2^K.",
+    help="Write only every 2^K-th frame, at the frame rate divided by 2^K (with --resolution).",
 )
 @click.option(
     "--preview",
@@ -133,7 +133,7 @@ if TYPE_CHECKING:
 @click.option("--with-skeleton", is_flag=True, help="Also write the skeleton's own file (ASF).")
 @salvage_option
 @click.option(
-    "--unverified", is_flag=True, help="Read fewer bytes, without checking their checksums."
+    "--unverified", is_flag=True, help="Read fewer bytes, but do not check their checksums."
 )
 @decoded_option
 @force_option
@@ -157,7 +157,7 @@ def decode_command(
     FILE.mcz, decode works like mcz convert.
     """
     options = DecodeOptions(**settings)
-    refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
+    refuse(unverified and salvage, "--salvage needs the checksums; leave out --unverified")
     given = Input(file, salvage=salvage, unverified=unverified, max_decoded=max_decoded)
     return decode(given, options, output, names=names, where=where, force=force, as_json=as_json)
 
@@ -300,12 +300,12 @@ def convert_command(
     if suffix != ".mcz" or choice.target is not None:
         refuse(
             not given.is_source and any(facts.values()),
-            f"{' '.join(f'--{name}' for name in OF_SOURCES)} are of source files, {file} is none",
+            f"{', '.join(f'--{name}' for name in OF_SOURCES)} need a source file, not {file}",
         )
         return decode(given, choice, output, names=names, where=where, force=force, as_json=as_json)
-    refuse(not given.is_source, f"{output}: mcz extract takes clips out of an .mcz")
+    refuse(not given.is_source, f"{output}: use mcz extract for clips of an .mcz")
     has_parts = bool(names or where or choice.frames or choice.joints)
-    refuse(has_parts, f"{output}: an .mcz is made of a whole file; mcz extract takes parts")
+    refuse(has_parts, f"{output}: an .mcz is made from a whole file; cut it with mcz extract")
     from mcz.cli.encode import encode_command
 
     facts |= {"rate": choice.rate, "unit": choice.unit, "up": choice.up}

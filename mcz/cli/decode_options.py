@@ -58,7 +58,7 @@ def check_options(options: DecodeOptions, salvage: bool) -> None:
     lone = options.frames is not None or options.resolution or salvage or options.filtered
     refuse(
         options.preview and (options.target is None or bool(lone)),
-        "--preview needs --to, and goes with none of --frames --resolution --salvage --post-filter",
+        "--preview needs --to, and excludes --frames, --resolution, --salvage and --post-filter",
     )
     refuse(options.decimate and not options.resolution, "--decimate needs --resolution")
     refuse(
@@ -79,7 +79,7 @@ def check_signal(options: DecodeOptions) -> None:
     other = options.joints is not None or options.preview or options.filtered
     refuse(
         options.signal is not None and other,
-        "--signal goes with none of --joints --preview --post-filter",
+        "--signal excludes --joints, --preview and --post-filter",
     )
     shown = options.is_scene
     refuse(
@@ -99,7 +99,9 @@ def refuse(wrong: bool, reason: str) -> None:
         raise Failure(reason, Exit.USAGE)
 
 
-SOURCE_GIVEN = "a source file, no .mcz; -o or --to says what it becomes, mcz encode compresses it"
+SOURCE_GIVEN = (
+    "a source file, not an .mcz; set the output with -o or --to, or compress it with mcz encode"
+)
 NO_LIMIT = 2**53  # of decoded bytes: the file was just written
 
 

@@ -93,7 +93,7 @@ def refuse_repeats(
         for option, count in counts.items():
             if count > 1 and not option.multiple and not option.count:
                 shown = max((*option.opts, *option.secondary_opts), key=len)
-                raise click.UsageError(f"{shown} is given {count} times, and takes one", context)
+                raise click.UsageError(f"{shown} is given {count} times; give it once", context)
 
 
 class Once(click.Command):

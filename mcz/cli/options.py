@@ -126,8 +126,8 @@ def copies_option(default: str) -> Callable[[Function], Function]:
     return click.option(
         "--copies/--no-copies",
         default=None,
-        help="Store skeletons, templates and the like twice, so that --salvage survives a flipped "
-        f"bit in them. Default: {default}.",
+        help="Store skeletons, templates and similar parts twice; --salvage then survives a "
+        f"flipped bit in them. Default: {default}.",
     )
 
 
@@ -310,7 +310,9 @@ def encoding_options(function: Function) -> Function:
     ) -> object:
         if quality is not None:
             if "max_error_cm" in params or "preset" in params:
-                raise click.UsageError("--quality and --param both limit the error")
+                raise click.UsageError(
+                    "--quality and --param both limit the error; give one of them"
+                )
             codec, params = codec or "lossy", params | {"max_error_cm": quality}
         return function(*args, codec=codec, params=params, **others)
 

@@ -31,7 +31,7 @@ NUMBERS = ("csv", "npz")  # tables; mcz.files.tables writes them
 TARGETS = (*NUMBERS, *CONVERSIONS, *SCENES)
 # Suffixes that decode does not write; a file of that name would hold something else.
 OTHERS = {
-    ".mcz": "mcz extract takes clips out of an .mcz",
+    ".mcz": "use mcz extract for clips of an .mcz",
     ".asf": "--with-skeleton writes the ASF beside it",
     **dict.fromkeys((".usd", ".usdc", ".usdz"), "--to usda writes USD as text"),
     ".gltf": "--to glb writes the same as one file",
@@ -100,7 +100,7 @@ def check_kept(output: str | None, name: str, *, is_skeleton: bool) -> None:
     if suffix in ("", own) or (is_skeleton and suffix == ".asf"):
         return
     if target_of(suffix) is not None or suffix in OTHERS:
-        reason = f"what is kept is {name}, which is not converted to {suffix}"
+        reason = f"the stored file is {name}, which cannot be converted to {suffix}"
         raise Failure(reason, Exit.USAGE, path=output)
     raise _unknown(str(output), suffix, f"the stored file is {name}, not", (own,))
 

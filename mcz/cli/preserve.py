@@ -40,9 +40,13 @@ def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
     help="Set the share of bytes to add; a small file gets more, so that it survives some damage.",
 )
 @click.option(
-    "--anew", is_flag=True, help="Rewrite the file, with recovery data for all of it together."
+    "--anew", is_flag=True, help="Rewrite the file, with one set of recovery data for all of it."
 )
-@click.option("--check", is_flag=True, help="Report the state of the file, and change nothing.")
+@click.option(
+    "--check",
+    is_flag=True,
+    help="Report whether the file is intact or can be repaired; change nothing.",
+)
 @json_option
 def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool) -> Exit:
     """Append recovery data to FILE.mcz, with which mcz repair can restore every byte.
@@ -71,14 +75,13 @@ def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_js
         return Exit.FINE
     for one in protections:
         echo(
-            f"{file}: bytes {one.start:,} to {one.stop:,} are protected: any "
-            f"{plural(one.n_recovery, 'block')} of {one.n_blocks:,} may be bad, of "
-            f"{one.block_size:,} bytes each, or {one.burst:,} bytes in a row; "
-            f"that takes {one.cost:,} bytes"
+            f"{file}: bytes {one.start:,} to {one.stop:,} are protected against the loss of any "
+            f"{plural(one.n_recovery, 'block')} of {one.n_blocks:,} ({one.block_size:,} bytes "
+            f"each), or of {one.burst:,} bytes in a row, at a cost of {one.cost:,} bytes"
         )
     if len(protections) > 1:
-        parts = f"these {len(protections)} parts are protected apart"
-        echo(f"{file}: {parts}; --anew does it for all together")
+        parts = f"these {len(protections)} parts are protected separately"
+        echo(f"{file}: {parts}; --anew protects them together")
     return Exit.FINE
 
 
@@ -91,7 +94,7 @@ def _check_protection(file: str, as_json: bool) -> Exit:
         document = asdict(recovery or Recovery()) | {"protected": recovery is not None}
         print_json({"target": file} | document)
     elif recovery is None:
-        echo(f"{file}: there are no recovery data")
+        echo(f"{file}: no recovery data")
     else:
         _print_protection(file, recovery)
     bad = recovery is None or recovery.bad_blocks or recovery.bad_recovery

@@ -146,7 +146,7 @@ def split_command(
 @click.option(
     "--rename",
     is_flag=True,
-    help="If the name of a clip is taken, put it below the name of its file: day2/walk.",
+    help="If the name of a clip is already used, prefix it with the name of its file: day2/walk.",
 )
 @click.option(
     "--skip-identical",

@@ -66,8 +66,8 @@ def replace_command(
 ) -> Exit:
     """Replace the values of one joint; all other streams are copied byte for byte.
 
-    The table has a row for every frame, and the columns of the joint by name, or only these
-    columns. Only --in-place changes IN.mcz.
+    The table has a row for each frame. Its columns are those of the joint; other columns are
+    ignored if the table has a header. Only --in-place changes IN.mcz.
     """
     import mcz
     from mcz.files.writing.atomic import refuse_inputs
@@ -102,16 +102,16 @@ def replace_command(
     if as_json:
         print_json({"output": shown, **asdict(result)})
         return Exit.FINE
-    coded = f"{result.joint} of {result.clip}" + (", coded anew" if result.anew else "")
+    coded = f"{result.joint} of {result.clip}" + (", re-encoded" if result.anew else "")
     line = f"{shown}: {result.size:,} bytes; {coded}: {result.joint_bytes:,}"
     echo(f"{line} of {result.joint_bytes_before:,} bytes, {result.codec}")
     if result.anew:
-        off = f"{result.max_error:.3g}, others by {result.others_error:.3g}"
-        echo(f"  off by at most, in units of the source: {result.joint} by {off}")
+        off = f"{result.max_error:.3g}, others {result.others_error:.3g}"
+        echo(f"  greatest error, in units of the source: {result.joint} {off}")
     if result.n_exceptions or result.n_exceptions_before:
         before = f"{result.n_exceptions_before:,} before"
         line = f"  {plural(result.n_exceptions, 'number')} of the joint off the grid, {before}"
-        echo(f"{line}; --on-grid rounds to it" if result.n_exceptions else line)
+        echo(f"{line}; use --on-grid to round them" if result.n_exceptions else line)
     for text in result.left_out:
         say(f"left out: {text}")
     return Exit.FINE

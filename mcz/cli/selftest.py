@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 CLIP = "walk"
 
 
-@click.command(short_help="Test this installation in some seconds.")
+@click.command(short_help="Test this installation in a few seconds.")
 @json_option
 def selftest_command(as_json: bool) -> Exit:
     """Show what is installed, and encode, decode and verify a generated walk with each codec.
 
-    Frames per second are of a clip of 240 frames and 96 channels, on one processor. They show
-    whether compiled kernels are used; longer clips are faster. Exit code 1: a codec failed.
+    Speeds are frames per second of a clip of 240 frames and 96 channels, on one processor. They
+    show whether compiled kernels are used; longer clips are faster. Exit code 1: a codec failed.
     """
     document = _installation()
     with warnings.catch_warnings():

@@ -244,7 +244,7 @@ class Rows:
     def _read_names(self) -> list[str]:
         line = self._line()
         if line is None:
-            raise SourceError("it is empty; the first line should be names")
+            raise SourceError("the input is empty; its first line must be names")
         try:
             (names,) = csv.reader([line.decode("utf-8-sig")], strict=True)
         except (UnicodeDecodeError, ValueError, csv.Error) as error:
@@ -332,5 +332,5 @@ def skeleton_in(path: str) -> Skeleton:
     elif lower.endswith(".bvh"):
         skeleton = mcz.read(path).skeleton
     else:
-        raise OptionError("a skeleton is in a .bvh, .asf or .mcz file", path=path)
+        raise OptionError("give the skeleton as a .bvh, .asf or .mcz file", path=path)
     return replace(skeleton, source=None, base=None)

@@ -68,7 +68,7 @@ COMMANDS = {"encode": "stream.stream_encode_command", "decode": "stream.stream_d
     epilog=EXIT_CODES,
 )
 def stream_command() -> None:
-    """Encode or decode frames as they arrive, each before the next is known, over pipe or TCP."""
+    """Encode or decode frames as they arrive, over a pipe or TCP."""
 
 
 HEARTBEAT = 5.0  # seconds
@@ -86,7 +86,7 @@ WARN_AFTER = 5.0  # seconds of frames
 @click.option(
     "--listen",
     metavar="HOST:PORT",
-    help="Send the stream to all who connect over TCP instead; port 0 is any that is free.",
+    help="Serve the stream over TCP instead of writing it; port 0: any free port.",
 )
 @click.option(
     "--clients",
@@ -96,7 +96,13 @@ WARN_AFTER = 5.0  # seconds of frames
     help="Wait for N clients before the first row is read (with --listen).",
 )
 @token_option("Require this token from clients.")
-@click.option("--codec", metavar="NAME", default="online", show_default=True)
+@click.option(
+    "--codec",
+    metavar="NAME",
+    default="online",
+    show_default=True,
+    help="Set the codec, which must work frame by frame.",
+)
 @param_option
 @rate_option("Set the frame rate (120, 29.97, 30000/1001).")
 @unit_option("the numbers")
@@ -113,8 +119,8 @@ WARN_AFTER = 5.0  # seconds of frames
     "--repeat",
     metavar="N",
     type=click.IntRange(min=0),
-    help="Repeat skeleton and clip header at every N-th frame at which one can join; 0: never.  "
-    "[default: 1, or less often with a bit rate]",
+    help="Repeat skeleton and clip header at every N-th place to join; 0: never.  [default: 1, or "
+    "less often with a bit rate]",
 )
 @click.option(
     "--heartbeat",
@@ -137,13 +143,14 @@ def stream_encode_command(
 ) -> Exit:
     """Encode rows of numbers from standard input, one by one.
 
-    The first line names markers (a,b,c: then a row has x, y and z of each in turn) or their
-    coordinates (a.x,a.y,a.z,...), unless --skeleton says what the columns are. CSV rows follow, an
-    empty field where a value is missing, or, with --float32, binary ones, NaN there. The
-    output of mcz decode --to csv and mcz stream decode for markers is accepted, too. A CSV line
-    "# set bitrate=4 gof=20" changes parameters of the codec from its next group of frames on.
+    The first line names markers (a,b,c: a row then has x, y and z of each in turn) or coordinates
+    (a.x,a.y,a.z,...). With --skeleton there is no such line: columns are the channels of the
+    skeleton. A row of CSV follows for each frame; an empty field is a missing value. With
+    --float32 rows are binary, and NaN is a missing value. The output of mcz decode --to csv and
+    mcz stream decode for markers is accepted, too. A CSV line "# set bitrate=4 gof=20" changes
+    parameters of the codec from its next group of frames on.
 
-    A bad or truncated row aborts the stream: all earlier frames are sent, but no end. At the end
+    A bad or truncated row aborts the stream: all earlier frames are sent, but not the end. Finally
     standard error reports the size of the stream, including framing.
     """
     from mcz.cli.tcp import Heart, listening
@@ -267,8 +274,8 @@ def stream_decode_command(
     """Print the frames of a live stream as they arrive.
 
     The stream is FILE.mcz, or standard input. A line of names comes first. CSV rows begin with the
-    number of the frame, counted from 0, and have an empty field where a value is missing; with
-    --float32 a row is only its values, NaN there. At the end standard error reports what arrived.
+    number of the frame, counted from 0; an empty field is a missing value. With --float32 a row
+    has only values, and NaN is a missing value. At the end standard error reports what arrived.
     The exit code is 4 if frames are missing, or if the stream was cut off: the source died, the
     connection broke, or no data arrived for --timeout.
     """

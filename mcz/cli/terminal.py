@@ -126,7 +126,7 @@ def binary_output() -> BinaryIO:
     Raises AccessError if it is closed, OptionError if it is a terminal.
     """
     if _stdout().isatty():
-        raise OptionError("binary data are not printed on a terminal; -o FILE or > FILE keeps them")
+        raise OptionError("binary data are not printed on a terminal; use -o FILE or > FILE")
     return _buffer()
 
 

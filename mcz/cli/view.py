@@ -81,7 +81,7 @@ LOOPBACK = "127.0.0.1"
     "--host",
     metavar="NAME",
     default=LOOPBACK,
-    help="Listen on a name of this machine's own: 127.0.0.1, localhost or ::1.",
+    help="Listen on this name of the local machine: 127.0.0.1, localhost or ::1.",
 )
 @click.option(
     "--port",
@@ -90,7 +90,7 @@ LOOPBACK = "127.0.0.1"
     default=0,
     help="Listen on this port. Default: any free one.",
 )
-@skeleton_option("Use this ASF for an AMC, or none. Default: found as mcz encode finds it.")
+@skeleton_option("Use this ASF for an AMC, or none. Default: found as in mcz encode.")
 @rate_option()
 @unit_option("a file that states none")
 @up_option("Set the up axis of a file that states none.")
@@ -111,7 +111,7 @@ LOOPBACK = "127.0.0.1"
     "most",
     metavar="BYTES",
     callback=to_bytes,
-    help="Set the greatest size of the page, 80M or 2G (with -o). Default: 50M.",
+    help="Limit the size of the page: 80M or 2G (with -o). Default: 50M.",
 )
 @decoded_option
 @force_option
@@ -124,7 +124,7 @@ def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **op
     Files without points appear as curves.
 
     A local server serves the page and the files to this machine only, at an unguessable address. It
-    ends some seconds after the last page is closed, or at Ctrl-C.
+    stops a few seconds after the last page is closed, or at Ctrl-C.
 
     With -o, write one page that needs neither a server nor a network. --clip and --where select
     clips of an archive; --codec re-encodes them. Several files are compared with the first, the

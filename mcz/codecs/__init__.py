@@ -96,7 +96,7 @@ def codec_by_name(name: str) -> Codec:
     """Return the codec of a name or alias; raises OptionError if there is none."""
     if ALIASES.get(name, name) not in CODECS:
         raise OptionError(
-            f"no codec is called {name!r}; there are: {among([*ALIASES, *CODECS], name)}"
+            f"no codec is called {name!r}; the codecs are {among([*ALIASES, *CODECS], name)}"
         )
     return CODECS[ALIASES.get(name, name)]
 
@@ -104,9 +104,11 @@ def codec_by_name(name: str) -> Codec:
 def choose_name(codec: str | None, effort: str | None) -> str:
     """Return the name for a codec or an effort, ``DEFAULT`` for neither; raises OptionError."""
     if codec is not None and effort is not None:
-        raise OptionError(f"codec {codec!r} and effort {effort!r}: one of them, not both")
+        raise OptionError(
+            f"codec {codec!r} and effort {effort!r} exclude each other; give one of them"
+        )
     if effort is not None and effort not in EFFORTS:
-        raise OptionError(f"no effort is called {effort!r}; there are: {', '.join(EFFORTS)}")
+        raise OptionError(f"no effort is called {effort!r}; the efforts are {', '.join(EFFORTS)}")
     return codec or EFFORTS.get(effort or "", DEFAULT)
 
 
@@ -125,7 +127,10 @@ def codec_by_id(id_: int, version: int, preset: int) -> Codec:
         raise UnsupportedError(f"codec {id_} is unknown")  # CODEC-03, CONV-16
     codec = CODECS[name]
     if version > codec.version:  # CODEC-04, HEAD-05
-        raise UnsupportedError(f"codec {codec.name}: version {version}, known is {codec.version}")
+        raise UnsupportedError(
+            f"codec {codec.name}: version {version} is unknown; this reader knows version "
+            f"{codec.version}"
+        )
     if preset != codec.preset:
         codec = replace(codec, preset=preset, name=bitstream_name(id_) or codec.name)
     if version < codec.version:

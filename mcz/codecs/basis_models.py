@@ -64,7 +64,10 @@ def build_bases(bases: Sequence[Basis | Floats], shift: int = FINE) -> bytes:
     size = sum(part.entries.size for part in parts)
     widest = max((part.entries.shape[1] for part in parts), default=0)
     if not 1 <= len(parts) <= MAX_BASES or size > MAX_ENTRIES or widest > MAX_POINTS:
-        raise MotionError(f"{len(parts)} bases of up to {widest} points and {size} entries in all")
+        raise MotionError(
+            f"{len(parts)} bases with up to {widest} points and {size} entries in all exceed "
+            "the limits of a model"
+        )
     if any(np.abs(part.entries).max(initial=0) > MAX_ENTRY for part in parts):
         raise MotionError("an entry of a basis exceeds 2^40")
     head = varint(len(parts))
@@ -93,7 +96,7 @@ def parse_heads(data: bytes, where: str = "model") -> tuple[tuple[Head, ...], in
     """Parse the headers of a model of kind 1; also return the offset of the entries."""
     n_bases, at = read_varint(data, 0)
     if not 1 <= n_bases <= MAX_BASES:  # BASES-02
-        raise FormatError(f"{n_bases} bases, not 1 to {MAX_BASES}", where=where)
+        raise FormatError(f"a model must have 1 to {MAX_BASES} bases, not {n_bases}", where=where)
     heads: list[Head] = []
     size = 0
     for _ in range(n_bases):
@@ -102,11 +105,15 @@ def parse_heads(data: bytes, where: str = "model") -> tuple[tuple[Head, ...], in
         size += n_points * n_vectors
         # BASES-03, BASES-04, BASES-06
         if not 1 <= n_vectors <= n_points <= MAX_POINTS or size > MAX_ENTRIES:
-            raise FormatError(f"a basis of {n_vectors} vectors of {n_points} entries", where=where)
+            raise FormatError(
+                f"a basis cannot have {n_vectors} vectors of {n_points} entries", where=where
+            )
         digits = np.frombuffer(data[at : at + n_vectors], "u1").astype(np.int64)
         at += n_vectors
         if len(digits) < n_vectors or digits.max() > MAX_SHIFT:  # BASES-04, BASES-05
-            raise FormatError(f"the shifts of a basis end, or one exceeds {MAX_SHIFT}", where=where)
+            raise FormatError(
+                f"the shifts of a basis are truncated, or one exceeds {MAX_SHIFT}", where=where
+            )
         heads.append(Head(digits, n_points))
     return tuple(heads), at
 
@@ -175,10 +182,10 @@ def find_bases(
         model = layout.find_model(id_)
     if model is None:
         # BASES-09
-        raise UnsupportedError(f"{codec}: model {id_.hex()} is not in the file nor well known")
+        raise UnsupportedError(f"{codec}: model {id_.hex()} is neither in the file nor well known")
     where = f"{codec}: model {id_.hex()}"
     if model.kind != BASES:  # SPACE-08
-        raise FormatError(f"{where} is one of kind {model.kind} where bases are due")
+        raise FormatError(f"{where} is of kind {model.kind}, but a model of bases is needed")
     heads, _ = parse_heads(model.data, where)
     check(heads)
     if sum(len(head.shifts) * head.n_points for head in heads) > MAX_KEPT:
@@ -200,5 +207,5 @@ def read_bases(path: Path) -> Model:
     try:
         parse_bases(data)
     except FormatError as error:
-        raise FormatError(f"no bases: {error}", path=path) from None
+        raise FormatError(f"cannot read bases: {error}", path=path) from None
     return Model(BASES, data)

@@ -77,7 +77,7 @@ def sensitivities(skeleton: Skeleton, values: Floats, max_frames: int | None = N
     """
     if max_frames is not None:
         if max_frames < 1:
-            raise OptionError(f"max_frames {max_frames} is less than 1")
+            raise OptionError(f"max_frames is {max_frames}; it must be at least 1")
         values = values[:: max(1, -(-len(values) // max_frames))]
     chain = Chain(skeleton)
     points = points_of(skeleton)

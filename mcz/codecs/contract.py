@@ -358,7 +358,7 @@ class Codec:
         unknown = sorted(set(given) - set(listed))
         if unknown:
             raise OptionError(
-                f"codec {self.name} has no parameter {unknown[0]!r}; it has "
+                f"codec {self.name} has no parameter {unknown[0]!r}; its parameters are "
                 f"{', '.join(listed) or 'none'}"
             )
         return {
@@ -370,6 +370,6 @@ class Codec:
 def refuse_extras(name: str, header: bytes, layout: Layout) -> None:
     """Raise FormatError for a header or resolutions of a codec that has none."""
     if header:  # RAW-01, FAST-01
-        raise FormatError(f"{name}: a header of {len(header)} bytes, which it does not have")
+        raise FormatError(f"{name}: the codec has no header, but {len(header)} bytes are given")
     if layout.n_resolutions != 1:  # CLIP-15
-        raise FormatError(f"{name}: {layout.n_resolutions} resolutions, it has 1")
+        raise FormatError(f"{name}: the codec has 1 resolution, not {layout.n_resolutions}")

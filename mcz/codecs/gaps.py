@@ -30,7 +30,7 @@ class FrameReader:
         valid = self.source.valid(start, stop)
         whole = values if valid is None else values[valid]
         if not np.isfinite(whole).all():
-            raise MotionError(f"{self.name}: frames {start}:{stop} hold a value that is not finite")
+            raise MotionError(f"{self.name}: a value in frames {start}:{stop} is not finite")
         if valid is None:
             out = self._unwrapper(values)
         else:
@@ -80,7 +80,7 @@ class LiveRows:
         row = np.asarray(values, np.float64)[None]
         known = np.ones(row.shape, np.bool_) if valid is None else valid[None]
         if not np.isfinite(row[known]).all():
-            raise MotionError(f"{self.name}: frame {at} holds a value that is not finite")
+            raise MotionError(f"{self.name}: a value of frame {at} is not finite")
         unwrapper = copy(self._unwrapper)
         row = fill_gaps(unwrapper(np.where(known, row, np.nan)), known, self._last)
         self._next = unwrapper, row[0]

@@ -83,7 +83,7 @@ def check_known_answer(codec: Codec) -> None:
             return
         if digest(codec, answer) != answer.sha256:
             raise UnsupportedError(
-                f"codec {codec.name}: this installation decodes its known answer wrongly; "
+                f"codec {codec.name} fails its self-test in this installation; "
                 "MCZ_LOOPS=interpreted decodes without compiled code"
             )
         _proved.add(name)

@@ -83,11 +83,11 @@ def _parse(stream: bytes, n_rows: int, n_channels: int) -> Ints:
     for channel in range(n_channels):
         head = stream[at : at + HEAD_SIZE]
         if len(head) < HEAD_SIZE:
-            raise FormatError(f"raw: the stream ends in the head of channel {channel}")
+            raise FormatError(f"raw: the stream is truncated in the head of channel {channel}")
         least, width = int.from_bytes(head[:8], "little"), head[8]
         at += HEAD_SIZE
         if width > 8:  # RAW-02
-            raise FormatError(f"raw: channel {channel} has offsets of {width} bytes")
+            raise FormatError(f"raw: channel {channel} cannot have offsets of {width} bytes")
         size = width * n_rows
         if at + size > len(stream):
             raise FormatError(

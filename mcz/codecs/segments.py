@@ -198,7 +198,7 @@ def _size(streams: Streams) -> int:
 def skeleton_of(name: str, layout: Layout) -> Skeleton:
     """Return the skeleton of a signal that codec ``name`` can encode; raises MotionError."""
     if layout.samples_per_frame != 1 or layout.skeleton is None:
-        raise MotionError(f"{name}: only signals of one sample a frame")
+        raise MotionError(f"{name}: the signal must have one sample a frame")
     return layout.skeleton
 
 

@@ -95,11 +95,11 @@ def space_of(name: str, fields: SpaceFields, layout: Layout) -> Space:
     """Build the Space of the fields of SPACE; raises FormatError or UnsupportedError."""
     apart, n_channels = bool(fields.flags & APART), layout.n_channels
     if apart and n_channels % N_COORDINATES:  # SPACE-02
-        raise FormatError(f"{name}: {n_channels} channels are not three coordinates each")
+        raise FormatError(f"{name}: {n_channels} channels are not a multiple of three coordinates")
     columns = columns_of(n_channels, apart=apart)
     n_matrices, n_points = columns.shape
     if n_points > MAX_POINTS:  # SPACE-03
-        raise FormatError(f"{name}: {n_points} points in a matrix, at most {MAX_POINTS}")
+        raise FormatError(f"{name}: {n_points} points in a matrix exceed the limit of {MAX_POINTS}")
     n_spatial = n_matrices if fields.basis == LEARNED else 0
     rest: list[Basis] = []
     if fields.model is not None:
@@ -132,14 +132,14 @@ def _check_heads(
     """Refuse a model unless it has a basis of each of ``n_points``, then courses and a mean."""
     n_due = len(n_points) + sum(bool(flags & flag) for flag in (COURSES, MEAN))
     if len(heads) != n_due:  # BASES-02, SPACE-06
-        raise FormatError(f"{name}: a model of {len(heads)} bases, {n_due} are due")
+        raise FormatError(f"{name}: the model has {len(heads)} bases; expected {n_due}")
     for head, due in zip(heads, n_points, strict=False):
         if head.n_points != due:  # SPACE-07
             raise FormatError(f"{name}: vectors of {head.n_points} entries for {due} points")
     # SPACE-06, SPACE-07
     if flags & MEAN and (len(heads[-1].shifts), heads[-1].n_points) != (1, n_channels):
         shape = len(heads[-1].shifts), heads[-1].n_points
-        raise FormatError(f"{name}: a mean of {shape} for {n_channels} channels")
+        raise FormatError(f"{name}: a mean of {shape} does not fit {n_channels} channels")
 
 
 def _weights(name: str, fields: SpaceFields, n_channels: int) -> Floats:
@@ -158,12 +158,12 @@ def check(name: str, layout: Layout, spans: Sequence[Span], *, fresh: bool) -> N
     # FRAME-02, FRAME-03, ONLINE-02, ONLINE-03, WIND-02
     if layout.samples_per_frame != 1 or layout.n_resolutions != 1:
         raise FormatError(
-            f"{name}: {layout.samples_per_frame} samples a frame, {layout.n_resolutions} "
-            "resolutions"
+            f"{name}: {layout.samples_per_frame} samples a frame and {layout.n_resolutions} "
+            "resolutions are not allowed"
         )
     if len(layout.groups) > 1:  # FRAME-01, ONLINE-01, WIND-01
-        raise FormatError(f"{name}: {len(layout.groups)} groups, it has one")
+        raise FormatError(f"{name}: the codec has one group, not {len(layout.groups)}")
     for span in spans:
         # FRAME-03, ONLINE-03, WIND-03, WIND-04
         if span.lead or span.tail or (fresh and not span.fresh):
-            raise FormatError(f"{name}: the segment at {span.first} bears upon others")
+            raise FormatError(f"{name}: the segment at {span.first} must be independent of others")

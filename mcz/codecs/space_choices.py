@@ -101,7 +101,9 @@ def sample_of(name: str, source: SignalSource) -> Sample:
     skeleton = skeleton_of(name, layout)
     apart = are_positions(skeleton)
     if layout.n_channels // (N_COORDINATES if apart else 1) > MAX_POINTS:
-        raise MotionError(f"{name}: {layout.n_channels} channels, at most {MAX_POINTS} in a matrix")
+        raise MotionError(
+            f"{name}: {layout.n_channels} channels exceed the {MAX_POINTS} of a matrix"
+        )
     size = min(layout.n_frames, BLOCK_FRAMES)
     last = layout.n_frames - size
     n_blocks = min(BLOCKS, max(1, layout.n_frames // BLOCK_FRAMES))
@@ -179,7 +181,7 @@ def choose_space(name: str, sample: Sample, step: float, which: str, in_time: In
             raise OptionError(f"{name}: the bases of {which} do not fit {n_points} points")
         candidates.append((_with_model(fields, model=model), _vectors(model)))
     if not candidates:
-        raise OptionError(f"{name}: there are no well-known bases of {n_points} points")
+        raise OptionError(f"{name}: no well-known bases have {n_points} points")
     if len(candidates) == 1:
         return candidates[0][0]
     sizes = [_expected_bytes(sample, in_time, v, step, c.models) for c, v in candidates]
@@ -192,7 +194,7 @@ def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Ch
     Raises OptionError without a step, or if ``which`` names bases of the motion itself.
     """
     if step is None:
-        raise OptionError(f"{name}: the step has to be given, for no frame is known yet")
+        raise OptionError(f"{name}: a live stream needs a step")
     sample, which = live_sample(name, layout, which)
     return choose_space(name, sample, step, which, frame_differences)
 
@@ -200,11 +202,13 @@ def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Ch
 def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
     """A sample without frames, and the bases available then; raises OptionError for others."""
     if which == "learned":
-        raise OptionError(f"{name}: basis learned needs all frames; mcz train makes one beforehand")
+        raise OptionError(
+            f"{name}: basis=learned needs all frames; learn a basis beforehand with mcz train"
+        )
     skeleton = skeleton_of(name, layout)
     n_points = layout.n_channels // (N_COORDINATES if are_positions(skeleton) else 1)
     if n_points > MAX_POINTS:
-        raise MotionError(f"{name}: {n_points} points, at most {MAX_POINTS} in a matrix")
+        raise MotionError(f"{name}: {n_points} points exceed the {MAX_POINTS} of a matrix")
     sample = _sample(skeleton, [np.zeros((1, layout.n_channels))], 0)
     return sample, basis_at_hand(sample) if which == "auto" else which
 
@@ -304,7 +308,7 @@ def _expected_bytes(
 
 def _which(text: object) -> str:
     if not isinstance(text, (str, Path)):
-        raise OptionError(f"basis is {text!r}, neither {', '.join(WHICH)} nor a file's name")
+        raise OptionError(f"basis is {text!r}; it must be {', '.join(WHICH)} or a file name")
     return str(text)
 
 
@@ -345,7 +349,7 @@ def _flag(text: object) -> bool:
     words = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
     flag = words.get(str(text).lower())
     if flag is None:
-        raise OptionError(f"virtual_markers is {text!r}, neither true nor false")
+        raise OptionError(f"virtual_markers is {text!r}; it must be true or false")
     return flag
 
 

@@ -89,16 +89,18 @@ def _check_alike(first: tuple[str, TrainingSet], other: tuple[str, TrainingSet])
     (name_a, a), (name_b, b) = first, other
     names = f"motions {name_a!r} and {name_b!r}"
     if len(a.names) != len(b.names):
-        raise MotionError(f"{names} have {len(a.names)} and {len(b.names)} points; one set is due")
+        raise MotionError(
+            f"{names} have {len(a.names)} and {len(b.names)} points, but must have the same"
+        )
     if a.names != b.names:
         at = next(
             i for i, pair in enumerate(zip(a.names, b.names, strict=True)) if len({*pair}) > 1
         )
         raise MotionError(f"{names} differ in point {at}: {a.names[at]!r} and {b.names[at]!r}")
     if a.up != b.up:
-        raise MotionError(f"{names} have the up axes {a.up} and {b.up}")
+        raise MotionError(f"{names} have different up axes, {a.up} and {b.up}")
     if a.unit != b.unit:
-        raise MotionError(f"of {names} one has a length unit, the other has none")
+        raise MotionError(f"of {names}, only one has a length unit")
 
 
 def with_mirror_images(training: TrainingSet) -> TrainingSet:
@@ -108,7 +110,7 @@ def with_mirror_images(training: TrainingSet) -> TrainingSet:
     """
     order = mirror_order(training.names)
     if order == list(range(len(order))):
-        raise OptionError("no two points have names that differ in left and right alone")
+        raise OptionError("no two point names differ only in left and right")
     axis = 2 if column_of(training.up) == 0 else 0
     images = []
     for clip in training.clips:
@@ -140,7 +142,7 @@ def with_headings(training: TrainingSet, n_turns: int) -> TrainingSet:
     headings.
     """
     if n_turns < 1:
-        raise OptionError(f"{n_turns} headings; at least one is needed")
+        raise OptionError(f"headings is {n_turns}; it must be at least 1")
     up = column_of(training.up)
     a, b = (up + 1) % 3, (up + 2) % 3
     clips = []
@@ -157,7 +159,7 @@ def with_headings(training: TrainingSet, n_turns: int) -> TrainingSet:
 def frames_of(training: TrainingSet, every: int = 1) -> Floats:
     """All frames of the clips, or every so many of each, (N, J, 3)."""
     if every < 1:
-        raise OptionError(f"every {every} frames; 1 means all of them")
+        raise OptionError(f"every is {every}; it must be at least 1")
     return np.concatenate([clip[::every] for clip in training.clips])
 
 
@@ -168,7 +170,7 @@ def window_coefficients(training: TrainingSet, n_frames: int, n_kept: int) -> Fl
     it has fewer frames than ``n_kept`` it has as many coefficients.
     """
     if n_frames < 1 or n_kept < 1:
-        raise OptionError(f"windows of {n_frames} frames, {n_kept} coefficients of each")
+        raise OptionError(f"windows of {n_frames} frames cannot keep {n_kept} coefficients each")
     parts = []
     for clip in training.clips:
         for start in range(0, len(clip), n_frames):
@@ -180,7 +182,7 @@ def window_coefficients(training: TrainingSet, n_frames: int, n_kept: int) -> Fl
 def steps(training: TrainingSet, n_frames: int, every: int = 1) -> Floats:
     """Displacements of points in ``n_frames``, from every frame or every so many, (N, J, 3)."""
     if n_frames < 1 or every < 1:
-        raise OptionError(f"steps of {n_frames} frames from every {every} frames")
+        raise OptionError(f"cannot make steps of {n_frames} frames from every {every} frames")
     return np.concatenate(
         [(clip[n_frames:] - clip[:-n_frames])[::every] for clip in training.clips]
     )
@@ -220,9 +222,9 @@ class Recipe:
         elif self.kind == "frames":
             vectors = frames_of(training, self.every)
         else:
-            raise OptionError(f"kind {self.kind!r} is not one of {', '.join(KINDS)}")
+            raise OptionError(f"kind is {self.kind!r}; it must be one of {', '.join(KINDS)}")
         if not len(vectors):
-            raise OptionError(f"no clip is long enough for training on {self.kind}")
+            raise OptionError(f"no clip is long enough to train on {self.kind}")
         return vectors
 
     def learn(self, training: TrainingSet, progress: Progress | None = None) -> Trained:
@@ -269,7 +271,7 @@ class Trained:
         of the start decides which one is reached. So several are tried where it matters.
         """
         if self.n_vectors != other.n_vectors or self.source.names != other.source.names:
-            raise OptionError("bases that were learned from other vectors cannot be compared")
+            raise OptionError("bases learned from different vectors cannot be compared")
         pairs = zip(self.learned, other.learned, strict=True)
         best = (min(pair, key=lambda learned: float(learned.objective[-1])) for pair in pairs)
         return replace(self, learned=tuple(best))

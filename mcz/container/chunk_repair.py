@@ -50,7 +50,7 @@ def scan_for_salvage(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
         scanned = scan(source, salvage=True, owners=owners)
     notes += restore_from_index(source, scanned)
     if not scanned.chunks:
-        raise FormatError("nothing can be salvaged: no chunk is whole")
+        raise FormatError("no chunk is intact, so nothing can be salvaged")
     return source, scanned, notes
 
 

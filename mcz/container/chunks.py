@@ -85,7 +85,7 @@ class Chunk:
     def size(self) -> int:
         """Bytes of the whole chunk, framing included."""
         if self.length is None:
-            raise FormatError(f"open chunk {self.label} has no length")
+            raise FormatError(f"chunk {self.label} is open, so its length is unknown")
         return self.length + FRAMING
 
     @property
@@ -135,14 +135,16 @@ def parse_chunk_header(data: bytes, offset: int) -> Chunk:
         )
     if reserved or flags & ~KNOWN_FLAGS:  # CHUNK-09
         raise FormatError(
-            f"chunk {kind.decode()} at {offset}: flags {flags:#x}, reserved {reserved}",
+            f"chunk {kind.decode()} at {offset}: flags {flags:#x} or reserved field "
+            f"{reserved} not allowed",
             offset=offset,
             value=flags,
         )
     if length == OPEN_LENGTH:
         if kind != ChunkType.DATA:  # CHUNK-10
             raise FormatError(
-                f"chunk {kind.decode()} at {offset} is open; only DATA may be", offset=offset
+                f"chunk {kind.decode()} at {offset} is open; only a DATA chunk may be",
+                offset=offset,
             )
         return Chunk(kind, flags, offset, None)
     if length > MAX_COUNT:
@@ -173,7 +175,9 @@ def read_chunk(source: ByteSource, offset: int) -> Chunk:
 def read_payload(source: ByteSource, chunk: Chunk, limit: int) -> bytes:
     """The checked payload of ``chunk``; raises ChecksumError, or LimitError beyond ``limit``."""
     if chunk.length is None:
-        raise FormatError(f"chunk {chunk.label} is open", offset=chunk.offset)
+        raise FormatError(
+            f"chunk {chunk.label} is open, so its length is unknown", offset=chunk.offset
+        )
     if chunk.length > limit:
         raise LimitError(
             f"chunk {chunk.label}: {chunk.length} bytes are over the limit of {limit}",
@@ -187,7 +191,7 @@ def check_chunk(data: bytes, chunk: Chunk) -> bytes:
     """The payload in ``data``, the bytes of the whole ``chunk``, after a check of its crc."""
     parsed = parse_chunk_header(data, chunk.offset)
     if chunk.length is None or len(data) != chunk.size:
-        raise FormatError(f"chunk {chunk.label} is not whole", offset=chunk.offset)
+        raise FormatError(f"chunk {chunk.label} is incomplete", offset=chunk.offset)
     if (parsed.type, parsed.length) != (chunk.type, chunk.length):
         raise FormatError(f"chunk {chunk.label} differs from the index", offset=chunk.offset)
     check_crc(chunk, zlib.crc32(memoryview(data)[: -CRC.size]), data[-CRC.size :])
@@ -223,13 +227,15 @@ def parse_foot(data: bytes, offset: int) -> Foot | None:
             f"crc of FOOT at {offset} is {crc:#010x}, which is wrong", offset=offset, value=crc
         )
     if flags:  # FOOT-01
-        raise FormatError(f"FOOT at {offset}: flags {flags:#x}, of which none is defined")
+        raise FormatError(f"FOOT at {offset}: flags {flags:#x}, but no flag is defined")
     if index_length and (
         index_offset > MAX_COUNT
         or index_length > MAX_COUNT
         or index_offset + index_length != offset  # GRAM-01
     ):
-        raise FormatError(f"FOOT at {offset}: index of {index_length} bytes at {index_offset}")
+        raise FormatError(
+            f"FOOT at {offset}: no index of {index_length} bytes fits at {index_offset}"
+        )
     if not index_length and index_offset:
         raise FormatError(f"FOOT at {offset}: index offset {index_offset} without an index")
     return Foot(index_offset, index_length)

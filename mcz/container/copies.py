@@ -91,13 +91,13 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
     for stored in parse_all(payloads.CopiedChunk, content, f"chunk {chunk.label}"):
         if stored.type not in COPIED:  # COPY-01
             raise FormatError(
-                f"a copy of a chunk of type {stored.type!r}", where=f"chunk {chunk.label}"
+                f"chunk type {stored.type!r} must not be copied", where=f"chunk {chunk.label}"
             )
         copy = Copy(chunk.offset - stored.distance, stored.type, stored.payload)
         if not end <= copy.offset <= copy.stop <= chunk.offset:  # COPY-03
             raise FormatError(
-                f"the copy of {copy.label}, which would end at {copy.stop}, "
-                f"is behind that of a chunk that ends at {end}",
+                f"the copy of {copy.label}, which ends at {copy.stop}, overlaps that of a "
+                f"chunk that ends at {end}, or is out of order",
                 where=f"chunk {chunk.label}",
             )
         end = copy.stop
@@ -146,4 +146,4 @@ def check_copies(
         there = before[at] if at < len(before) else None
         same = there is not None and (there.offset, there.type) == (copy.offset, copy.type)
         if there is None or not same or payload_of(there) != copy.payload:  # COPY-02
-            raise FormatError(f"no {copy.label} is equal to its copy", where=f"chunk {chunk.label}")
+            raise FormatError(f"{copy.label} differs from its copy", where=f"chunk {chunk.label}")

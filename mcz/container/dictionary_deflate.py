@@ -47,7 +47,9 @@ def decode_data(data: bytes, flags: int, size: int, where: str) -> bytes:
     encoding = flags & payloads.ENCODING
     if encoding == payloads.STORED:
         if len(data) != size:  # ATTA-03, SRCE-01
-            raise FormatError(f"{len(data)} bytes stored, {size} stated", where=where)
+            raise FormatError(
+                f"{len(data)} bytes are stored, but the stated size is {size}", where=where
+            )
         return bytes(data)
     after = words() if encoding == payloads.AFTER_WORDS else b""
     return inflate(data, size, where, words=after)
@@ -129,16 +131,23 @@ def join_parts(row: AttachmentRow, payload_of: Callable[[Chunk], bytes]) -> byte
         expected = (row.name, number, len(row.parts), row.size)
         # ATTA-01, ATTA-02
         if (fields.name, fields.part, fields.n_parts, fields.size) != expected:
-            raise FormatError(f"not part {number} of {row.name!r}", where=f"chunk {chunk.label}")
+            raise FormatError(
+                f"expected part {number} of {row.name!r}", where=f"chunk {chunk.label}"
+            )
         if digest not in (b"", fields.sha256):  # ATTA-02
-            raise FormatError("another hash than in the part before", where=f"chunk {chunk.label}")
+            raise FormatError(
+                "the hash differs from that of the previous part", where=f"chunk {chunk.label}"
+            )
         if fields.part_size > left:  # ATTA-03
             raise FormatError(
-                f"more than the {row.size} bytes of the file", where=f"chunk {chunk.label}"
+                f"the parts exceed the stated size of {row.size} bytes",
+                where=f"chunk {chunk.label}",
             )
         parts.append(decode_data(fields.data, fields.flags, fields.part_size, chunk.label))
         left, digest = left - fields.part_size, fields.sha256  # ATTA-03
     data = b"".join(parts)
     if left or hashlib.sha256(data).digest() != digest:  # ATTA-04, ATTA-05
-        raise ChecksumError(f"attachment {row.name!r}: {len(data)} bytes, hash or size is wrong")
+        raise ChecksumError(
+            f"attachment {row.name!r}: hash or size of its {len(data)} bytes is wrong"
+        )
     return data

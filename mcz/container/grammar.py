@@ -53,12 +53,14 @@ def thing_of(chunk: Chunk) -> str:
     """The row of the grammar that a closed chunk belongs to; raises FormatError for wrong flags."""
     thing = NAMED.get(chunk.type)
     if chunk.flags != FLAGS_OF.get(chunk.type, 0 if thing else chunk.flags):  # CHUNK-15
-        raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, not those of its type")
+        raise FormatError(
+            f"chunk {chunk.label}: flags {chunk.flags:#x} are not allowed for its type"
+        )
     if thing is not None:
         return thing
     if chunk.flags & ChunkFlag.ANCILLARY:  # CHUNK-12
         return OTHER
-    raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")  # CHUNK-11
+    raise UnsupportedError(f"chunk {chunk.label} is critical, and its type is unknown")  # CHUNK-11
 
 
 def order_error(thing: str, label: str, state: str) -> FormatError:
@@ -66,7 +68,7 @@ def order_error(thing: str, label: str, state: str) -> FormatError:
     if state == START:
         return FormatError(f"the first chunk is {label}, not HEAD")
     if state == INDEX:
-        return FormatError(f"INDX is followed by {label}, not by a FOOT")
+        return FormatError(f"INDX must be followed by a FOOT, not by {label}")
     if thing == "HEAD":
         return FormatError(f"a second {label}")
     if state == CLIP:

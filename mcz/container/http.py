@@ -347,8 +347,7 @@ class HttpFile(io.RawIOBase):
             raise self._server.error(REPLACED)
         if answer.status == 200:
             raise self._server.error(
-                "the server answers 200 to a range of bytes, so it gives no parts; "
-                "download the file first"
+                "the server ignores byte ranges (it answers 200); download the file first"
             )
         if answer.status != 206:
             raise self._server.error(f"the server answers {answer.status} {answer.reason}")
@@ -368,7 +367,7 @@ class HttpFile(io.RawIOBase):
     def _body(self, answer: Answer, size: int) -> bytes:
         if len(answer.body) != size:
             received = "more" if len(answer.body) > size else f"{len(answer.body)}"
-            raise self._server.error(f"{size} bytes are announced, {received} were received")
+            raise self._server.error(f"{size} bytes were announced, but {received} received")
         return answer.body
 
 

@@ -102,7 +102,7 @@ class Listing:
         for clip, packed in zip(clips, segments, strict=True):
             cend = clip.cend
             if cend is None:
-                raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
+                raise FormatError(f"clip {clip.name!r} cannot be indexed, because it has no CEND")
             rows.append(
                 (
                     *(clip.name, skeletons[clip.skeleton], clip.n_frames),

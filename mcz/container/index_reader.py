@@ -84,7 +84,8 @@ def _inflate(payload: bytes, offset: int, limit: int, where: str) -> tuple[Indx,
     previous = outer.previous
     if previous and (previous.length < FRAMING or previous.stop > offset):  # INDX-06
         raise FormatError(
-            f"INDX at {offset} continues one of {previous.length} bytes at {previous.offset}"
+            f"INDX at {offset} continues an impossible one: {previous.length} bytes at "
+            f"{previous.offset}"
         )
     check("INDX: inflated size", outer.size, limit)
     return outer, inflate(outer.data, outer.size, "INDX")
@@ -102,12 +103,12 @@ def read_indexes(fetch: Fetch, offset: int, length: int, limit: int) -> Iterator
     for _ in range(MOST_INDEXES):
         listed = parse_index(fetch(offset, length), offset, limit)
         if due not in (None, listed.chunk):  # INDX-06
-            raise FormatError(f"INDX at {offset} is not the one that another continues")
+            raise FormatError(f"INDX at {offset} differs from the one that the next INDX continues")
         yield listed
         if (due := listed.previous) is None:
             return
         offset, length = due.offset, due.length
-    raise FormatError(f"more than {MOST_INDEXES} INDX continue each other")  # INDX-07
+    raise FormatError(f"more than {MOST_INDEXES} INDX chunks are chained")  # INDX-07
 
 
 def directory_of(indexes: Iterable[Listed]) -> Directory:
@@ -148,7 +149,7 @@ def _add_shared(directory: Directory, listed: Listed) -> None:
         table.blobs("type"), table.blobs("id"), _chunks_of(table, listed.start), strict=True
     ):
         if (kind, id_) in directory.shared:
-            raise FormatError(f"INDX: two entries of {kind!r} have the id {id_.hex()}")
+            raise FormatError(f"INDX: two {kind.decode()} entries have the id {id_.hex()}")
         directory.shared[kind, id_] = Chunk(kind, 0, chunk.offset, chunk.length)
 
 
@@ -168,7 +169,7 @@ def _add(table: dict[str, T], name: str, row: T) -> None:
 def _bounds(counts: Numbers, total: int, what: str) -> Numbers:
     """The first item of each in a table of ``total`` items, and the end of the last ones."""
     if counts.sum(dtype=np.float64) != total:  # INDX-08
-        raise FormatError(f"INDX: {what} are not as many as their counts say")
+        raise FormatError(f"INDX: the number of {what} differs from the sum of their counts")
     return np.concatenate(([0], np.cumsum(counts)))
 
 
@@ -202,7 +203,7 @@ class ClipTables:
         behind = np.concatenate(([index.n_behind], clips.numbers("n_ancillary")))
         self.ancillary_bounds = _bounds(behind, len(index.ancillary), "ancillary chunks")
         if len(clips) and int(clips.numbers("skeleton").max()) >= len(index.skeletons):  # INDX-08
-            raise FormatError("INDX: a clip of a skeleton that it does not list")
+            raise FormatError("INDX: a clip refers to a skeleton that is not listed")
         self.ends = self._ends()
 
     def _ends(self) -> Numbers:
@@ -284,7 +285,7 @@ class _Clips:
 
     def add(self, tables: ClipTables) -> None:
         if tables.index.n_behind and not (self.names or tables.start):
-            raise FormatError("INDX: ancillary chunks of a clip before the first")
+            raise FormatError("INDX: ancillary chunks precede the first clip")
         if tables.index.n_behind and self.names:
             chunks = tables.ancillary(0, tables.start)
             self._behind.setdefault(len(self.names) - 1, []).extend(chunks)
@@ -314,14 +315,14 @@ def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
     end = clip.clip.stop  # INDX-01
     for gap, size, signal, n_frames, lead, tail, flags in rows:
         if signal >= len(first):
-            raise FormatError(f"{where} has a segment of signal {signal}")
+            raise FormatError(f"{where} has a segment of signal {signal}, which does not exist")
         kind = next((kind for kind, bit in PACKETS.items() if flags & bit), 0)
         flags &= ~PACKETS.get(kind, 0)
         header = SegmentHeader(signal, first[signal], n_frames, lead, tail, flags)
         row = SegmentRow(end + gap, size, header, kind)
         if kind == FRAME:
             if header != SegmentHeader(0, first[0], 1, flags=flags & FRESH):
-                raise FormatError(f"{where} has {header} as a packet of kind {kind}")
+                raise FormatError(f"{where}: {header} cannot be a packet of kind {kind}")
             if model_row is not None:
                 header = replace(header, flags=header.flags | MASKS)
                 row = replace(row, header=header, mask_row=model_row)
@@ -351,10 +352,12 @@ class IndexCheck:
             before = [(place, n) for place, n in self._found if place.chunk == outer.previous]
             if not before:  # INDX-06
                 offset = outer.previous.offset
-                raise FormatError(f"no INDX at {offset} is the one that it continues", where=where)
+                raise FormatError(
+                    f"it continues an INDX at {offset}, which is not there", where=where
+                )
             since, depth = before[0][0], before[0][1] + 1
         if depth > MOST_INDEXES:  # INDX-07
-            raise FormatError(f"it continues {depth - 1} others", where=where)
+            raise FormatError(f"it continues a chain of {depth - 1} others", where=where)
         due = index_record(directory, since)
         expected = build(due, where)
         if content[: len(expected)] != expected:  # INDX-04, INDX-05, INDX-08

@@ -124,7 +124,7 @@ def _check_keys(keys: Sequence[str], where: str) -> None:
         if key in INTERPRETED:  # META-03
             raise FormatError(f"{key!r} must not follow a clip", where=where)
     if len(keys) != len(set(keys)):  # META-04
-        raise FormatError(f"a key occurs twice in one record: {sorted(keys)}", where=where)
+        raise FormatError(f"a key occurs twice in the record: {sorted(keys)}", where=where)
 
 
 PRIVATE = "x-"
@@ -208,7 +208,9 @@ def check_pair(key: str, value: str | None) -> None:
     ``value`` None: it is removed.
     """
     if key in INTERPRETED:
-        raise OptionError(f"{key!r} belongs to the values or the source of a clip, and stays")
+        raise OptionError(
+            f"{key!r} is determined by the clip's values or source, and cannot be set or removed"
+        )
     if key not in KEYS and not (key.startswith(PRIVATE) and len(key) > len(PRIVATE)):
         near = nearest(key, SETTABLE)
         hint = f"did you mean {near}?" if near else f"registered are {', '.join(SETTABLE)}"

@@ -334,11 +334,11 @@ class Parser:
     def _read_foot(self, at: int) -> Event:
         foot = parse_foot(self._bytes(at, at + FOOT.size, "a FOOT"), at)
         if foot is None:
-            raise FormatError(f"at {at} there is neither a chunk nor a FOOT")
+            raise FormatError(f"neither a chunk nor a FOOT begins at {at}")
         event, state, rows = FootEvent(foot, at, self._index), self.state, GRAMMAR[FOOT_THING]
         self.at, self.state, self._index = event.end, rows[BODY], None
         if not event.is_right:  # FOOT-04
-            error = FormatError(f"FOOT at {at} points to {foot}, the index is at {event.place}")
+            error = FormatError(f"FOOT at {at} points to {foot}, but the index is at {event.place}")
             return Fault(at, error, None, event, state)
         if state not in rows:
             return Fault(at, order_error(FOOT_THING, f"FOOT at {at}", state), None, event, state)
@@ -355,7 +355,7 @@ class Parser:
         first, sequence, start, stop = head
         skipped, kind = sequence - self._sequence, first & KIND
         if not self._may_skip(kind, skipped):  # PACK-02
-            raise FormatError(f"packet {sequence} where {self._sequence} is due")
+            raise FormatError(f"packet {sequence} where packet {self._sequence} is expected")
         end = stop + CHECK_SIZE
         if end > len(data):
             self._position(at, self._start + end)
@@ -388,7 +388,7 @@ class Parser:
 
     def _due(self) -> int:
         if not self._is_told:  # PACK-14
-            raise FormatError(f"packet at {self.at}: none before it in its DATA states its frame")
+            raise FormatError(f"packet at {self.at}: no packet before it states its frame")
         return self._number
 
     def _mask(self) -> bytes:
@@ -415,4 +415,4 @@ class Parser:
                 raise FormatError(f"packet at {event.body}: its segment differs in starting fresh")
             event.segment = header
         elif packet.kind == END_KIND and packet.body:  # PACK-05, PACK-07
-            raise FormatError(f"end packet with {len(packet.body)} bytes")
+            raise FormatError(f"the end packet must be empty, but has {len(packet.body)} bytes")

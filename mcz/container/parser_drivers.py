@@ -83,7 +83,7 @@ def repeated_chunks(payload: bytes, offset: int) -> list[ChunkEvent]:
         if isinstance(event, Fault):
             raise event.error
         if not isinstance(event, ChunkEvent):
-            raise FormatError(f"REPT before {offset} holds other things than chunks")
+            raise FormatError(f"REPT before {offset} contains bytes that are no chunk")
         repeated.append(event)
     kinds = [event.chunk.type for event in repeated]
     middle = set(kinds[1:-1]) <= {ChunkType.SKEL, ChunkType.MODL}

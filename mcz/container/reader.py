@@ -153,7 +153,7 @@ class Container:
 
     def _read_directory(self, foot: Foot, tail: bytes) -> Directory:
         if foot.index_length < FRAMING:
-            raise FormatError(f"FOOT: an index of {foot.index_length} bytes")
+            raise FormatError(f"FOOT: {foot.index_length} bytes are too few for an index")
         begin = self.source.size - len(tail)
 
         def fetch(offset: int, length: int) -> bytes:
@@ -214,7 +214,7 @@ class Container:
         where, payload = f"{kind.decode()} {id_.hex()}", self.payload(chunk)
         plain = plain_payload(kind, payload, where, self.profile, self.max_decoded)
         if plain_id(kind, plain) != id_:
-            raise ChecksumError(f"its id is not {id_.hex()}", where=f"chunk {chunk.label}")
+            raise ChecksumError(f"its id should be {id_.hex()}", where=f"chunk {chunk.label}")
         return plain, chunk.label
 
     def skeleton(self, id_: bytes) -> Skeleton:
@@ -240,7 +240,7 @@ class Container:
         """The template in the SRCE with this id."""
         fields = parse(payloads.Srce, *self._shared_payload(ChunkType.SRCE, id_))
         if fields.format != format_id:  # CLIP-03, SKEL-04
-            raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
+            raise FormatError(f"SRCE {id_.hex()} has format {fields.format}, not {format_id}")
         return fields.data
 
     def clip(self, row: ClipRow, *, shared: bool = False) -> payloads.Clip:
@@ -257,7 +257,8 @@ class Container:
             raise FormatError(row.damage[0], clip=row.name)
         if differs and not row.damage:
             raise FormatError(
-                f"clip {row.name!r} is {_row_text(row_of_fields)}, in the index {_row_text(row)}"
+                f"clip {row.name!r} is {_row_text(row_of_fields)}, but the index says "
+                f"{_row_text(row)}"
             )
         return fields
 
@@ -278,7 +279,9 @@ class Container:
             return None
         fields = parse(payloads.Cend, self.payload(row.cend), row.cend.label)
         if fields.n_frames != row.n_frames:
-            raise FormatError(f"{row.cend.label}: {fields.n_frames} frames, not {row.n_frames}")
+            raise FormatError(
+                f"{row.cend.label} states {fields.n_frames} frames, not {row.n_frames}"
+            )
         return fields
 
     def attachment(self, row: AttachmentRow) -> bytes:
@@ -353,7 +356,7 @@ class Container:
         # INDX-02, INDX-03, PACK-04, PACK-08, PACK-09, PACK-11, PACK-15
         if not is_packet(data, Packet(row.packet, 0, body, fresh, implied)):
             raise ChecksumError(
-                f"crc of the packet at {row.offset} is wrong, or it is not frame {number}",
+                f"packet at {row.offset}: its crc is wrong, or it is not frame {number}",
                 offset=row.offset,
             )
         return body
@@ -372,7 +375,7 @@ class Container:
     def _check_row(self, row: SegmentRow) -> None:
         if row.stop > self.source.size:
             raise FormatError(
-                f"a segment is said to lie at {row.offset}, past the end of the file",
+                f"the index places a segment at {row.offset}, past the end of the file",
                 offset=row.offset,
             )
         limit = self.profile.packet_bytes if row.packet else self.profile.chunk_bytes
@@ -400,12 +403,12 @@ def _parse_table(data: bytes, row: SegmentRow, counts: StreamCounts) -> StreamTa
         raise FormatError(f"DATA payload at {row.offset}: {error}", offset=row.offset) from None
     if table.header != row.header:
         raise FormatError(
-            f"segment at {row.offset} is {table.header}, in the index {row.header}",
+            f"segment at {row.offset} is {table.header}, but the index says {row.header}",
             offset=row.offset,
         )
     if table.payload_size != row.size:  # DATA-01
         raise FormatError(
-            f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes",
+            f"segment at {row.offset}: its streams end at byte {table.payload_size} of {row.size}",
             offset=row.offset,
             value=table.payload_size,
         )

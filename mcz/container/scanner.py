@@ -180,9 +180,11 @@ class Scanner:
     def _begin_clip(self, chunk: Chunk, payload: bytes) -> None:
         fields = parse_clip(payload, self.found.directory.head, chunk.label)
         if not fields.name or fields.name in self.found.directory.clips:  # CLIP-01, GRAM-06
-            raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
+            raise FormatError(
+                f"chunk {chunk.label}: clip name {fields.name!r} is empty or already used"
+            )
         if not fields.signals:  # CLIP-05
-            raise FormatError(f"chunk {chunk.label}: a clip without a signal")
+            raise FormatError(f"chunk {chunk.label}: the clip has no signal")
         # LIMIT-18
         check(f"chunk {chunk.label}: signals", len(fields.signals), self.parser.profile.signals)
         if self.strict and strict.check_clip(
@@ -214,12 +216,14 @@ class Scanner:
         header, at = row.header, row.offset - HEADER.size
         assert self.clip is not None
         if self.parser.profile.is_plain and header.flags & GROUP_NOTES:  # LIMIT-21
-            raise LimitError(f"DATA at {at}: the profile small has no group notes")
+            raise LimitError(f"DATA at {at}: profile small does not allow group notes")
         if header.signal >= len(self.first):
-            raise FormatError(f"DATA at {at}: signal {header.signal}")  # DATA-06
+            raise FormatError(f"DATA at {at}: signal {header.signal} does not exist")  # DATA-06
         due = self.first[header.signal]
         if not self._may_follow(header.first, due):  # DATA-08
-            raise FormatError(f"DATA at {at}: first frame {header.first}, {due} is due")
+            raise FormatError(
+                f"DATA at {at}: the segment begins at frame {header.first}; expected {due}"
+            )
         self.first[header.signal] = header.stop  # DATA-08
         self.clip.segments.append(row)
 
@@ -240,7 +244,7 @@ class Scanner:
         self.found.directory.clips[clip.name] = clip
         stored = [row.stored(clip.n_frames) for row in clip.signals]
         return [
-            FormatError(f"clip {clip.name!r}: signal {signal} has {frames} of {due} frames")
+            FormatError(f"clip {clip.name!r}: signal {signal} has {frames} frames; expected {due}")
             for signal, (frames, due) in enumerate(zip(self.first, stored, strict=True))
             if frames != due
         ]

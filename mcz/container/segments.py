@@ -146,16 +146,17 @@ def parse_segment_header(data: bytes) -> tuple[SegmentHeader, int]:
         value, at = read_varint(data, at)
         fields.append(value)
     if at >= len(data):
-        raise TruncatedError(f"a segment header ends at {at}")
+        raise TruncatedError(f"the segment header is truncated at byte {at}")
     flags = data[at]
     if flags & ~KNOWN_FLAGS:
-        raise FormatError(
-            f"segment flags {flags:#x}, of which {flags & ~KNOWN_FLAGS:#x} is reserved"
-        )
+        raise FormatError(f"segment flags {flags:#x}: bits {flags & ~KNOWN_FLAGS:#x} are reserved")
     if fields[2] == 0:  # DATA-07
-        raise FormatError("a segment of no frames")
+        raise FormatError("a segment must have at least one frame")
     if fields[1] + fields[2] + fields[4] > MAX_COUNT or fields[3] > fields[1]:  # CONV-18, DATA-10
-        raise FormatError(f"a segment of frames {fields[1]} + {fields[2]}, support {fields[3:]}")
+        raise FormatError(
+            f"segment of {fields[2]} frames from {fields[1]} on, lead and tail {fields[3:]}: "
+            "out of range"
+        )
     signal, first, n_frames, lead, tail = fields
     return SegmentHeader(signal, first, n_frames, lead, tail, flags), at + 1
 
@@ -169,10 +170,12 @@ def parse_stream_table(data: bytes, counts: StreamCounts) -> StreamTable:
     n_streams = counts.total(header.flags)
     bitmap_size = (n_streams + 7) // 8
     if at + bitmap_size > len(data):
-        raise TruncatedError(f"a stream table ends at {len(data)}, in its bitmap")
+        raise TruncatedError(
+            f"the stream table is truncated after {len(data)} bytes, in its bitmap"
+        )
     bitmap = int.from_bytes(data[at : at + bitmap_size], "little")
     if bitmap >> n_streams:  # DATA-05
-        raise FormatError(f"stream bitmap has bits beyond its {n_streams} streams")
+        raise FormatError(f"the stream bitmap has bits set beyond its {n_streams} streams")
     at += bitmap_size
     lengths = []
     for index, is_present in enumerate(reversed(f"{bitmap:0{n_streams}b}"[:n_streams])):
@@ -180,17 +183,17 @@ def parse_stream_table(data: bytes, counts: StreamCounts) -> StreamTable:
         if is_present == "1":
             length, at = read_varint(data, at)
             if length == 0:  # DATA-04
-                raise FormatError(f"stream {index} is marked as present and has no bytes")
+                raise FormatError(f"stream {index} is marked as present, but has no bytes")
         lengths.append(length)
     extension = b""
     if header.flags & EXTENDED:  # CONV-10
         size, at = read_varint(data, at)
         extension, at = data[at : at + size], at + size
     if at + 4 > len(data):
-        raise TruncatedError(f"a stream table ends at {len(data)}")
+        raise TruncatedError(f"the stream table is truncated after {len(data)} bytes")
     (stored,) = struct.unpack_from("<I", data, at)
     if stored != zlib.crc32(data[:at]):  # CHUNK-06, DATA-02
-        raise ChecksumError(f"table_crc of a segment is {stored:#010x}, which is wrong")
+        raise ChecksumError(f"the table_crc of a segment is {stored:#010x}, which is wrong")
     offsets, offset = [], at + 4
     for length in lengths:
         offsets.append(offset)
@@ -204,7 +207,7 @@ def mask_of(segment: bytes) -> bytes:
     if not header.flags & MASKS:
         return b""
     if header.n_frames != 1:  # PACK-21
-        raise FormatError(f"a frame implies the masks of {header.n_frames} frames")
+        raise FormatError(f"the masks of a frame packet cover {header.n_frames} frames, not one")
     table = parse_stream_table(segment, StreamCounts(1, 1))
     index = table.mask(0) or 0
     return segment[table.offsets[index] : table.offsets[index] + table.lengths[index]]
@@ -219,8 +222,8 @@ def frame_table(
     """
     if (counts.n_groups, counts.n_resolutions) != (1, 1):  # PACK-13
         raise FormatError(
-            f"frame {header.first} is a packet without a table, of a signal with {counts.n_groups} "
-            f"groups and {counts.n_resolutions} resolutions"
+            f"frame {header.first}: a packet without a table, but the signal has "
+            f"{counts.n_groups} groups and {counts.n_resolutions} resolutions"
         )
     if header.flags & MASKS:
         return StreamTable(header, counts, 0, (0, 0), (mask_size, size))
@@ -247,11 +250,13 @@ def parse_mask(data: bytes, n_rows: int, n_channels: int, name: str) -> Mask:
     while at < len(data):
         run, after = read_varint(data, at)
         if run > size - start or (run == 0 and at > 0):  # MASK-02
-            raise FormatError(f"a mask run of {run} at {start} of {size}", clip=name)
+            raise FormatError(
+                f"a mask run of {run} values at {start} exceeds the mask of {size}", clip=name
+            )
         flat[start : start + run] = valid
         start, at, valid = start + run, after, not valid
     if start != size:  # MASK-03
-        raise FormatError(f"a mask of {start} values, not {size}", clip=name)
+        raise FormatError(f"a mask has {start} values; expected {size}", clip=name)
     return flat.reshape(n_channels, n_rows).T  # MASK-01
 
 

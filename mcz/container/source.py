@@ -143,7 +143,7 @@ class ByteSource:
         """The ``size`` bytes at ``offset``; raises TruncatedError if the file ends before."""
         if offset + size > self.size:
             raise TruncatedError(
-                f"bytes {offset} to {offset + size} were read, but the file ends at {self.size}"
+                f"cannot read bytes {offset} to {offset + size}: the file ends at {self.size}"
             )
         if size == 0:
             return b""
@@ -175,7 +175,7 @@ class ByteSource:
         if self._process != os.getpid():
             self._forked()
         if getattr(self._stream, "closed", False):
-            raise OptionError("it is closed", path=self.name)
+            raise OptionError("the file is closed", path=self.name)
         data = self._read_stream(offset, size)
         self.n_requests += 1
         self.n_bytes += size
@@ -187,7 +187,9 @@ class ByteSource:
             while len(data) < size:  # raw streams may return fewer than requested
                 more = self._read_at(offset + len(data), size - len(data))
                 if not more:
-                    raise TruncatedError(f"the file ended at {offset + len(data)} while read")
+                    raise TruncatedError(
+                        f"the file was shortened to {offset + len(data)} bytes while it was read"
+                    )
                 data += more
         except MczError as error:
             if self.remote and isinstance(error, TruncatedError):
@@ -232,7 +234,7 @@ class ByteSource:
     def __reduce__(self) -> tuple[object, ...]:
         if self.target is None:
             raise OptionError(
-                "it was opened as a stream and cannot be pickled; open a path", path=self.name
+                "a file opened as a stream cannot be pickled; open it by its path", path=self.name
             )
         return open_source, (self.target,)
 
@@ -319,7 +321,9 @@ def open_source(target: Target) -> ByteSource:
         return ByteSource(io.BytesIO(data), name="bytes", target=data)
     if not isinstance(target, (str, os.PathLike)):
         if not hasattr(target, "read"):
-            raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")
+            raise OptionError(
+                f"cannot open {target!r}, which is neither a path nor a binary stream"
+            )
         name = str(getattr(target, "name", "stream"))
         if not target.seekable():
             return ByteSource(io.BytesIO(target.read()), name=name)

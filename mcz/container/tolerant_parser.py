@@ -133,7 +133,7 @@ class TolerantParser(Parser):
         suspect, self._suspect = self._suspect, None
         if suspect not in (None, at):
             self._next = event
-            return Fault(suspect, FormatError(f"a packet that does not end before {at}"))
+            return Fault(suspect, FormatError(f"a packet extends beyond {at}"))
         return event
 
     def _pass(self, chunk: Chunk) -> None:
@@ -157,7 +157,7 @@ class TolerantParser(Parser):
         data = self._bytes(at, at + FOOT.size)
         crc = int.from_bytes(data[4:8], "little")
         if data[24:] != END_MAGIC or crc != zlib.crc32(data[:4] + data[8:]):
-            raise FormatError("neither a chunk nor a FOOT")
+            raise FormatError("expected a chunk or a FOOT")
         self.at, self.state = at + FOOT.size, FILE
         return FootEvent(Foot(0, 0), at, None)
 
@@ -168,6 +168,8 @@ class TolerantParser(Parser):
     def _skip(self, count: int) -> None:
         if count < 0:  # LIVE-07
             self.state = CLIP
-            raise FormatError(f"packet {self._sequence + count} where {self._sequence} is due")
+            raise FormatError(
+                f"packet {self._sequence + count} where packet {self._sequence} is expected"
+            )
         self._number += count  # LIVE-05
         self._is_told = self._is_told and (count == 0 or self.n_signals == 1)  # LIVE-06

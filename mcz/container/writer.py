@@ -172,7 +172,7 @@ class Writer:
         self._between_clips("CLIP")
         name = record.name
         if not name:
-            raise MotionError("a clip needs a name")
+            raise MotionError("a clip must have a name")
         self._new_name(name, self.directory.clips)
         chunk = self.chunk(ChunkType.CLIP, build(record, f"clip {name!r}"))
         self._clip = ClipRow.of(record, chunk)
@@ -201,7 +201,7 @@ class Writer:
         """
         clip = self._in_clip("DATA")
         if self._next_packet is None or self._implying is None:
-            raise FormatError("no DATA is open with a segment of signal 0")
+            raise FormatError("no open DATA has a segment of signal 0")
         model, segment = self._implying
         masks = model.header.flags & MASKS  # PACK-20
         header = SegmentHeader(0, first, 1, flags=fresh * FRESH | masks)
@@ -226,7 +226,7 @@ class Writer:
         """Begin an open DATA: until ``close_data``, each segment is one packet."""
         self._in_clip("DATA")
         if self._next_packet is not None:
-            raise FormatError("a DATA is open already")
+            raise FormatError("a DATA is already open")
         self._write(build_header(ChunkType.DATA, 0, OPEN_LENGTH))
         self._next_packet, self._implying = 0, None
 
@@ -270,7 +270,7 @@ class Writer:
         """
         self._between_clips("META")
         if records and not self.directory.clips:
-            raise MotionError("metadata in a file without a clip")  # META-01
+            raise MotionError("metadata need a clip, and the file has none")  # META-01
         for payload in build_metas(records, short=self.short, profile=self.profile):
             self.ancillary(ChunkType.META, payload)
 

@@ -129,7 +129,7 @@ def data_set_files(name: str, paths: Iterable[str]) -> dict[str, bytes]:
 def _columns(motion: Motion) -> list[_Column]:
     signal, skeleton = motion.signals[0], motion.skeleton
     if signal.channels is not None or not skeleton.n_channels:
-        raise MotionError("no motion of joints or points", clip=motion.name)
+        raise MotionError("the motion has neither joints nor points", clip=motion.name)
     length = next((u for u, cm in UNIT_CM.items() if cm == skeleton.unit_cm), NOT_APPLICABLE)
     angle = skeleton.angle_unit or NOT_APPLICABLE
     points = map(_word, skeleton.addresses())

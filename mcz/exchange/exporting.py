@@ -57,7 +57,7 @@ def export(
     in parallel, by default one. Raises OptionError and as ``mcz.open``.
     """
     if to not in FORMS:
-        raise OptionError(f"to {to!r}: one of {', '.join(FORMS)}")
+        raise OptionError(f"unknown format {to!r}; the formats are {', '.join(FORMS)}")
     folder, report, written = Folder(Path(directory)), Report(), set[str]()
     portable = PortableNames()
 
@@ -67,7 +67,7 @@ def export(
             for own, data, notes in files():
                 path = portable(str(safe_path(own)))
                 if path in written:
-                    raise FormatError(f"another clip becomes {path}, too")
+                    raise FormatError(f"another clip is also written to {path}")
                 folder.write(path, data, target, force=force)
                 written.add(path)
                 report.outcomes.append(Outcome(path, "written", len(data), notes=notes))

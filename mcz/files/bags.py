@@ -137,7 +137,7 @@ def check_bag(
     """
     check = BagCheck(Path(folder))
     if not is_bag(folder):
-        raise OptionError(f"it is not a bag: it has no {DECLARATION}", path=folder)
+        raise OptionError(f"not a bag: {DECLARATION} is missing", path=folder)
     try:
         _BagValidator(check, progress).run()
     except OSError as error:

@@ -174,15 +174,15 @@ class Pool:
                 self._workers.discard(worker)
             self._free.put(None)
         raise WorkerError(
-            f"the process that worked on it ended unexpectedly ({worker.code}), {TRIES} times; "
-            "there may be too little memory",
+            f"the process that worked on it ended unexpectedly ({worker.code}), {TRIES} "
+            "times; perhaps too little memory is free",
             hint=Hint.JOBS,
         )
 
     def _started(self) -> Worker:
         with self._lock:
             if self._closed:
-                raise WorkerError("the work was given up")
+                raise WorkerError("the work was cancelled")
             worker = Worker(self._first)
             self._workers.add(worker)
             return worker

@@ -123,12 +123,13 @@ class Chain:
         turning = any(c.kind in ANGLE_KINDS for c in channels)
         if not skeleton.angle_unit and (turning or any(any(j.axis) for j in skeleton.joints)):
             raise MotionError(
-                f"skeleton {skeleton.name!r}: its angle unit is unknown, so its rotations are, too"
+                f"the angle unit of skeleton {skeleton.name!r} is unknown, so its rotations "
+                "have no meaning"
             )
         if channels and not any(channel.kind for channel in channels):
             raise MotionError(
-                f"skeleton {skeleton.name!r}: all of its {len(channels)} channels are plain "
-                "scalars, which place no joint"
+                f"skeleton {skeleton.name!r}: all {len(channels)} channels are plain scalars, "
+                "which do not move joints"
             )
         self.radians = np.pi / 180 if skeleton.angle_unit == "deg" else 1.0
         self.turned = [orientation(joint, self.radians) for joint in skeleton.joints]

@@ -80,7 +80,7 @@ class Contacts:
         for run in self.runs:
             last = run.first + run.n_frames
             if run.joint not in self.joints or not 0 <= run.first < last <= self.n_frames:
-                raise MotionError(f"{run} is not of {self.n_frames} frames of {self.joints}")
+                raise MotionError(f"{run} does not fit {self.n_frames} frames of {self.joints}")
 
     def frames(self, joint: str) -> Bools:
         """Contact state of ``joint`` in every frame, bool (n_frames,).
@@ -89,7 +89,7 @@ class Contacts:
         """
         if joint not in self.joints:
             known = ", ".join(self.joints)
-            raise MotionError(f"joint {joint!r} is not one of the feet examined: {known}")
+            raise MotionError(f"joint {joint!r} is not among the examined feet: {known}")
         standing = np.zeros(self.n_frames, np.bool_)
         for run in self.runs:
             if run.joint == joint:
@@ -139,14 +139,14 @@ class FootTracks:
         indices = find_feet(skeleton) if joints is None else [skeleton.find(j) for j in joints]
         if not indices:
             raise MotionError(
-                f"skeleton {skeleton.name!r}: none of its {counted(skeleton.n_joints, 'joint')} is "
-                "a foot by its name",
+                f"skeleton {skeleton.name!r}: none of its "
+                f"{counted(skeleton.n_joints, 'joint')} is named like a foot",
                 hint=Hint.FEET,
             )
         if skeleton.unit_cm is None:
             raise OptionError(
-                f"skeleton {skeleton.name!r}: its length unit is unknown, and a foot stands where "
-                "it is slow in cm/s",
+                f"the length unit of skeleton {skeleton.name!r} is unknown, but contacts are "
+                "detected by speed in cm/s",
                 hint=Hint.UNIT,
             )
         addresses, firsts = skeleton.addresses(), first_points(skeleton)

@@ -215,11 +215,11 @@ def _targets_seen(
     for kind, (positions, count) in shapes.items():
         if positions is not None and (positions.ndim != 3 or positions.shape[1:] != (count, 3)):
             raise MotionError(
-                f"skeleton {skeleton.name!r} has {count} {kind}, and their positions are of shape "
-                f"{positions.shape}, not (n_frames, {count}, 3)"
+                f"skeleton {skeleton.name!r} has {count} {kind}, so positions must have shape "
+                f"(n_frames, {count}, 3), not {positions.shape}"
             )
     if markers is not None and len(markers) != len(points):
-        raise MotionError(f"{len(points)} frames of points, {len(markers)} of virtual markers")
+        raise MotionError(f"{len(points)} frames of points, but {len(markers)} of virtual markers")
     positions = points if markers is None else np.concatenate([points, markers], axis=1)
     seen = np.array(np.moveaxis(positions, 0, 2), np.float64, order="C")
     finite: Bools = np.isfinite(seen)

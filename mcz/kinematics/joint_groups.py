@@ -55,10 +55,10 @@ def find_joints(skeleton: Skeleton, name: str, option: str) -> list[int]:
         pattern = re.compile(GROUPS[name], re.IGNORECASE)
         joints = [i for i, joint in enumerate(skeleton.joints) if pattern.search(joint.name)]
     if not joints and (name == "feet" or name in GROUPS):
-        raise OptionError(
-            f"{option}: no joint is one of the {name} by its name; name those that are"
-        )
+        raise OptionError(f"{option}: no joint is named like one of the {name}; name the joints")
     if not joints:
         known = ["feet", *GROUPS, *addresses]
-        raise OptionError(f"{option}: no joint or group {name!r} among {among(known, name)}")
+        raise OptionError(
+            f"{option}: no joint or group {name!r}; the names are {among(known, name)}"
+        )
     return joints

@@ -148,8 +148,8 @@ class _Positions:
 def marker_distance(skeleton: Skeleton) -> float:
     if skeleton.unit_cm is None:
         raise OptionError(
-            f"skeleton {skeleton.name!r}: its length unit is unknown, and virtual markers lie 3 cm "
-            "off its joints",
+            f"the length unit of skeleton {skeleton.name!r} is unknown, but virtual markers "
+            "lie 3 cm off its joints",
             hint=Hint.UNIT,
         )
     return MARKER_DISTANCE_CM / skeleton.unit_cm
@@ -158,7 +158,7 @@ def marker_distance(skeleton: Skeleton) -> float:
 def check_radius(radius_cm: float) -> None:
     """Raise OptionError for a bad radius of a shell."""
     if not 0 < radius_cm < np.inf:
-        raise OptionError(f"a shell of {radius_cm} cm: its radius is a length above 0")
+        raise OptionError(f"the radius of the shell is {radius_cm} cm; it must be above 0")
 
 
 def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
@@ -166,7 +166,7 @@ def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
     check_radius(radius_cm)
     if skeleton.unit_cm is None:
         raise OptionError(
-            f"skeleton {skeleton.name!r}: its length unit is unknown, and the shell lies "
+            f"the length unit of skeleton {skeleton.name!r} is unknown, but the shell lies "
             f"{radius_cm:g} cm off its joints",
             hint=Hint.UNIT,
         )

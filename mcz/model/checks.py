@@ -31,7 +31,7 @@ def check_fields(thing: object, rules: Mapping[str, Rule]) -> None:
         except (TypeError, ValueError, OverflowError, AttributeError):
             kind = type(thing).__name__.lower()
             shown = " ".join(reprlib.repr(value).split())  # in one line
-            raise MotionError(f"{kind}: {name} is {shown}, not {rule.words}") from None
+            raise MotionError(f"{kind}: {name} is {shown}; it must be {rule.words}") from None
         if converted is not value:
             object.__setattr__(thing, name, converted)
 
@@ -197,9 +197,9 @@ def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
             if isinstance(text, bool) or (isinstance(text, float) and value != text):
                 raise ValueError
         except (TypeError, ValueError, OverflowError):
-            raise OptionError(f"{name} is {text!r}, not an integer") from None
+            raise OptionError(f"{name} is {text!r}; it must be an integer") from None
         if not low <= value <= high:
-            raise OptionError(f"{name} is {value}, not from {low} to {high}", value=value)
+            raise OptionError(f"{name} is {value}; it must be {low} to {high}", value=value)
         return value
 
     return in_range(f"{low:,} to {high:,}", parse)
@@ -214,9 +214,9 @@ def number(name: str, low: float, high: float) -> Callable[[Any], float]:
                 raise ValueError
             value = float(text)
         except (TypeError, ValueError, OverflowError):
-            raise OptionError(f"{name} is {text!r}, not a number") from None
+            raise OptionError(f"{name} is {text!r}; it must be a number") from None
         if not low <= value <= high:
-            raise OptionError(f"{name} is {value}, not from {low:g} to {high:g}", value=value)
+            raise OptionError(f"{name} is {value}; it must be {low:g} to {high:g}", value=value)
         return value
 
     return in_range(f"{low:g} to {high:g}", parse)
@@ -231,7 +231,7 @@ def choice(
         if isinstance(text, str):
             text = formerly.get(text, text)
         if text not in among:
-            raise OptionError(f"{name} is {text!r}, not one of {', '.join(among)}")
+            raise OptionError(f"{name} is {text!r}; it must be one of {', '.join(among)}")
         return str(text)
 
     return in_range(", ".join(among), parse)

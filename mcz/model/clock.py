@@ -228,7 +228,7 @@ def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
     """The timeline of ``name``, a motion or clip; raises OptionError where it is unknown."""
     if timeline is None:
         raise OptionError(
-            "its frame rate is unknown, and so are its times", clip=name, hint=Hint.RATE
+            "its frame rate is unknown, so its times are unknown too", clip=name, hint=Hint.RATE
         )
     return timeline
 
@@ -289,9 +289,9 @@ def _ascend(numbers: Ints) -> bool:
 def check_numbers(numbers: Ints, name: str) -> None:
     """Raise MotionError for frame numbers of ``name`` that a clip cannot have."""
     if not _ascend(numbers):
-        raise MotionError("its frame numbers do not ascend", clip=name)
+        raise MotionError("frame numbers must ascend", clip=name)
     if len(numbers) and not (numbers[0] >= -MAX_NUMBER and numbers[-1] <= MAX_NUMBER):
-        raise MotionError("a frame number is beyond 2^52 - 1", clip=name)
+        raise MotionError("a frame number exceeds 2^52 - 1", clip=name)
 
 
 def usual_step(numbers: Ints | None) -> int:

@@ -35,27 +35,27 @@ def row_numbers(key: Any, n_rows: int, noun: str) -> Rows:
     try:
         array = np.asarray(key)
     except ValueError:  # lists of different lengths
-        raise OutOfRangeError(f"{noun}s {key!r} are no array") from None
+        raise OutOfRangeError(f"{noun}s cannot be indexed with {key!r}") from None
     if array.dtype == np.bool_:
         if array.shape not in ((n_rows,), (0,)):  # NumPy takes an empty mask of any axis
-            raise OutOfRangeError(f"a mask of shape {array.shape} for {n_rows} {noun}s")
+            raise OutOfRangeError(f"a mask of shape {array.shape} does not fit {n_rows} {noun}s")
         return np.flatnonzero(array)
     if array.size == 0 and not isinstance(key, np.ndarray):
         array = array.astype(np.int64)
     if array.dtype.kind not in "iu":
         raise OutOfRangeError(
-            f"{noun}s are chosen by integers, slices or a mask, not by {array.dtype}"
+            f"index {noun}s with integers, slices or a mask, not with {array.dtype}"
         )
     wrong = array[(array < -n_rows) | (array >= n_rows)]
     if wrong.size:
-        raise OutOfRangeError(f"{noun} {wrong[0]} of {n_rows}")
+        raise OutOfRangeError(f"{noun} {wrong[0]} is out of range; there are {n_rows}")
     numbers = array.astype(np.int64)
     return np.where(numbers < 0, numbers + n_rows, numbers)
 
 
 def _single(number: int, n_rows: int, noun: str) -> int:
     if not -n_rows <= number < n_rows:
-        raise OutOfRangeError(f"{noun} {number} of {n_rows}")
+        raise OutOfRangeError(f"{noun} {number} is out of range; there are {n_rows}")
     return number % n_rows
 
 

@@ -71,13 +71,13 @@ from mcz.model.types import Floats, Ints, Values
 def frame_rate_of(rate: Any, name: str) -> Fraction:
     """Convert a number to the nearest frame rate, a Fraction; raises MotionError."""
     if isinstance(rate, (bool, np.bool_)) or np.ndim(rate):
-        raise MotionError(f"frame rate {rate!r}", clip=name)
+        raise MotionError(f"frame rate {rate!r} is not a positive number", clip=name)
     with suppress(TypeError, ValueError, OverflowError):  # not a number, NaN, infinite
         exact = isinstance(rate, Fraction)
         value: Fraction = rate if exact else Fraction(float(rate)).limit_denominator(2**52)
         if value > 0:
             return value
-    raise MotionError(f"frame rate {rate!r}", clip=name)
+    raise MotionError(f"frame rate {rate!r} is not a positive number", clip=name)
 
 
 MOTION_ROLE, RESIDUALS = "motion", "residuals"
@@ -123,7 +123,7 @@ class Motion:
     def __post_init__(self) -> None:
         check_fields(self, MOTION)
         if not self.signals:
-            raise MotionError("it has no signal", clip=self.name)
+            raise MotionError("a motion needs at least one signal", clip=self.name)
         for signal in self.signals:
             if signal.channels is None and signal.n_channels != self.skeleton.n_channels:
                 raise MotionError(
@@ -134,11 +134,16 @@ class Motion:
         self._check_roles()
         counts = {signal.n_frames for signal in self.signals}
         if len(counts) > 1:
-            raise MotionError(f"signals of {sorted(counts)} frames", clip=self.name)
+            raise MotionError(
+                f"the numbers of frames of its signals differ: {sorted(counts)}", clip=self.name
+            )
         if self.frame_rate is not None:
             object.__setattr__(self, "frame_rate", frame_rate_of(self.frame_rate, self.name))
         if self.frame_numbers is not None and len(self.frame_numbers) != self.n_frames:
-            raise MotionError(f"{len(self.frame_numbers)} frame numbers", clip=self.name)
+            raise MotionError(
+                f"{len(self.frame_numbers)} frame numbers do not match the number of frames",
+                clip=self.name,
+            )
         if self.frame_numbers is not None:
             check_numbers(self.frame_numbers, self.name)
         if self.number_step < 1:
@@ -156,9 +161,9 @@ class Motion:
             object.__setattr__(self, "signals", tuple(given))
         roles = [signal.role for signal in self.signals]
         if MOTION_ROLE in roles[1:]:
-            raise MotionError("a motion that is not its first signal", clip=self.name)
+            raise MotionError("only the first signal can be a motion", clip=self.name)
         if roles.count(TIMES) > 1:
-            raise MotionError("two signals of times", clip=self.name)
+            raise MotionError("more than one signal of times", clip=self.name)
         for index, signal in enumerate(self.signals):
             if (signal.role == RESIDUALS) != (signal.of is not None):
                 raise MotionError(f"signal {signal.name!r}: of is {signal.of}", clip=self.name)
@@ -167,7 +172,9 @@ class Motion:
             if signal.role == TIMES:
                 fault = times_signal_fault(signal) or times_fault(signal.masked()[:, 0])
                 if fault:
-                    raise MotionError(f"signal {signal.name!r}: no times: {fault}", clip=self.name)
+                    raise MotionError(
+                        f"signal {signal.name!r}: invalid times: {fault}", clip=self.name
+                    )
 
     @property
     def motion_signal(self) -> Signal | None:
@@ -209,10 +216,10 @@ class Motion:
         of step 1.
         """
         if not isinstance(frames, slice):
-            raise OutOfRangeError(f"a motion is cut by a slice such as [10:20], not by {frames!r}")
+            raise OutOfRangeError(f"cut a motion with a slice such as [10:20], not with {frames!r}")
         chosen = row_numbers(frames, self.n_frames, "frame")
         if not isinstance(chosen, range) or chosen.step != 1:
-            raise OutOfRangeError(f"{frames} has a step; mcz.resample gives other frame rates")
+            raise OutOfRangeError(f"{frames} has a step; change the frame rate with mcz.resample")
         return self.cut(chosen.start, max(chosen.start, chosen.stop))
 
     def cut(self, start: int, stop: int) -> Motion:

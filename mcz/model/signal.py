@@ -59,7 +59,9 @@ def check_poses(name: str, signal: Sampled) -> None:
         )
     if signal.samples_per_frame != 1:
         raise MotionError(
-            f"{signal.samples_per_frame} samples a frame are not one pose a frame", clip=name
+            f"one pose a frame is needed, but the signal has {signal.samples_per_frame} "
+            "samples a frame",
+            clip=name,
         )
 
 
@@ -135,16 +137,18 @@ class Signal:
             object.__setattr__(self, "grids", (Grid(kind),) * self.n_channels)
         if len(self.grids) != self.n_channels:
             raise MotionError(
-                f"signal {self.name!r}: {len(self.grids)} grids, {self.n_channels} channels"
+                f"signal {self.name!r}: {len(self.grids)} grids do not match "
+                f"{self.n_channels} channels"
             )
         integers = self.n_channels > 0 and all(g.kind == GridKind.INTEGER for g in self.grids)
         if integers != (self.stored.dtype == np.int64):
             raise MotionError(
-                f"signal {self.name!r}: {self.stored.dtype} values on {self.grids[:1]}"
+                f"signal {self.name!r}: {self.stored.dtype} values do not fit grid {self.grids[:1]}"
             )
         if self.samples_per_frame < 1 or len(self.values) % self.samples_per_frame:
             raise MotionError(
-                f"signal {self.name!r}: {len(self.values)} rows at {self.samples_per_frame} a frame"
+                f"signal {self.name!r}: {len(self.values)} rows are not a multiple of "
+                f"{self.samples_per_frame} a frame"
             )
         self._check_order()
         for name, array in (("ordinals", self.ordinals), ("mask", self.mask)):
@@ -152,7 +156,8 @@ class Signal:
                 raise MotionError(f"signal {self.name!r}: {name} does not match the values")
         if self.channels is not None and len(self.channels) != self.n_channels:
             raise MotionError(
-                f"signal {self.name!r}: {len(self.channels)} channels, {self.n_channels} columns"
+                f"signal {self.name!r}: {len(self.channels)} channels, but {self.n_channels} "
+                "columns"
             )
         if self.scaling is not None:
             self.scaling.check(self.n_channels)
@@ -173,20 +178,25 @@ class Signal:
             (rows >= 0) & (rows < self.n_rows) & (channels >= 0) & (channels < self.n_channels)
         )
         if not is_within.all() or (np.diff(cells) <= 0).any():
-            raise MotionError(f"signal {self.name!r}: exceptions outside of it or out of order")
+            raise MotionError(f"signal {self.name!r}: exceptions are out of range or out of order")
         for row, channel, grid in self.grid_changes:
             whole = row >= 0 and row % self.samples_per_frame == 0
             if not (whole and 0 <= channel < self.n_channels):
-                raise MotionError(f"signal {self.name!r}: grid change at {row}, {channel}")
+                raise MotionError(
+                    f"signal {self.name!r}: the grid change at row {row}, channel {channel} "
+                    "is out of range or out of order"
+                )
             if (grid.kind == GridKind.INTEGER) != (self.stored.dtype == np.int64):
-                raise MotionError(f"signal {self.name!r}: {self.stored.dtype} values on {grid}")
+                raise MotionError(
+                    f"signal {self.name!r}: {self.stored.dtype} values do not fit grid {grid}"
+                )
         changes = sorted(self.grid_changes, key=itemgetter(0))
         if len(rows) and not all(g.is_text for g in (*self.grids, *(c[2] for c in changes))):
             is_text = np.array([grid.is_text for grid in self.grids])[channels]
             for row, channel, grid in changes:
                 is_text[(channels == channel) & (rows >= row)] = grid.is_text
             if not is_text.all():
-                raise MotionError(f"signal {self.name!r}: exceptions on a grid without text")
+                raise MotionError(f"signal {self.name!r}: exceptions need a text grid")
 
     @property
     def has_poses(self) -> bool:

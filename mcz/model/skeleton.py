@@ -177,21 +177,21 @@ class Skeleton:
         for index, joint in enumerate(self.joints):
             if not -1 <= joint.parent < index:  # SKEL-05
                 raise MotionError(
-                    f"joint {index} ({joint.name!r}): parent {joint.parent} is not before it"
+                    f"joint {index} ({joint.name!r}): its parent {joint.parent} must precede it"
                 )
         if self.unit_cm is not None and self.unit_cm <= 0:  # SKEL-01
-            raise MotionError(f"unit of {self.unit_cm} cm")
+            raise MotionError(f"unit_cm is {self.unit_cm}, not a valid length")
         if self.angle_unit not in ("deg", "rad", ""):
-            raise MotionError(f"angle unit {self.angle_unit!r}")
+            raise MotionError(f"angle unit {self.angle_unit!r} is neither deg nor rad")
         for name in ("up_axis", "forward_axis"):
             axis = getattr(self, name).removeprefix("+")
             if axis not in AXES:
                 raise MotionError(f"{name.replace('_', ' ')} {axis!r}")
             object.__setattr__(self, name, axis)
         if self.up_axis and self.up_axis[-1:] == self.forward_axis[-1:]:  # SKEL-10
-            raise MotionError(f"up axis {self.up_axis!r}, parallel to forward axis")
+            raise MotionError(f"up axis {self.up_axis!r} is parallel to the forward axis")
         if self.handedness not in HANDS:
-            raise MotionError(f"handedness {self.handedness!r}")
+            raise MotionError(f"handedness {self.handedness!r} is neither right nor left")
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -269,7 +269,9 @@ class Skeleton:
                 joint = int(joint)
         if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
             return int(joint)
-        raise MotionError(f"no joint {joint!r} among {text_format.among(self.addresses(), joint)}")
+        raise MotionError(
+            f"no joint {joint!r}; the joints are {text_format.among(self.addresses(), joint)}"
+        )
 
 
 def first_columns(

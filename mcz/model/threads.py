@@ -50,7 +50,7 @@ def limit_threads(threads: int | None) -> Iterator[None]:
 def check_threads(threads: int | None) -> int | None:
     """Return ``threads``; raises OptionError for a number below 1."""
     if threads is not None and threads < 1:
-        raise OptionError(f"threads: {threads}, not at least 1")
+        raise OptionError(f"threads is {threads}; it must be at least 1")
     return threads
 
 

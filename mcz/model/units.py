@@ -26,10 +26,12 @@ def unit_cm_of(unit: str) -> float:
     match = _LENGTH.fullmatch(unit)
     if not match or match[2] not in UNIT_CM or match[1] == ".":
         names = ", ".join(UNIT_CM)
-        raise OptionError(f"unit {unit!r} is not one of {names}, nor a length such as 5.6444cm")
+        raise OptionError(
+            f"unit {unit!r} is unknown; it must be one of {names}, or a length such as 5.6444cm"
+        )
     size = float(Fraction(match[1] or 1) * Fraction(str(UNIT_CM[match[2]])))
     if not LEAST_CM <= size <= MOST_CM:
-        raise OptionError(f"unit {unit!r} is not between {LEAST_CM:g} and {MOST_CM:g} cm")
+        raise OptionError(f"unit {unit!r} is out of range: {LEAST_CM:g} to {MOST_CM:g} cm")
     return size
 
 

@@ -88,7 +88,7 @@ class _Log:
         self.numbers = _numbers(moving)
         self.seconds: dict[int, Floats] = {}  # of samples, by how many a frame has
         if self.figure is None and not self.series:
-            raise MotionError("neither positions nor scalars, nothing to log", clip=moving.name)
+            raise MotionError("there are neither positions nor scalars to log", clip=moving.name)
 
     def all(self) -> None:
         self._still()

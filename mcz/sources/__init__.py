@@ -317,6 +317,6 @@ def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:
         if source_format.id == format_id:
             if source_format.is_skeleton != of_skeleton:  # CLIP-04, SKEL-03
                 sort = "skeletons" if of_skeleton else "clips"
-                raise FormatError(f"source format {source_format.name} is not one of {sort}")
+                raise FormatError(f"source format {source_format.name} is not of kind {sort}")
             return source_format
     raise UnsupportedError(f"source format {format_id} is unknown")  # CONV-16

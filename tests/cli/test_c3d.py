@@ -208,7 +208,7 @@ def test_an_asf_stays_as_it_is(samples: Path, tmp_path: Path, call: Call) -> Non
     asf = (tmp_path / "walk.asf").read_bytes()
     options = ("-o", tmp_path / "s.mcz", "--up", "y")
     code, _, err = call("encode", tmp_path / "walk.asf", *options)
-    assert code == 2 and "give the up axis with its AMC" in err
+    assert code == 2 and "set the up axis when you encode its AMC" in err
     target = tmp_path / "walk.mcz"
     assert call("encode", tmp_path / "walk.amc", "-o", target, "--up", "y")[0] == 0
     out = tmp_path / "out"

@@ -164,7 +164,7 @@ def test_errors_are_json_where_it_is_asked_for(
     (tmp_path / "walk.bvh").write_bytes(b"HIERARCHY")
     found = document("sample", tmp_path)
     assert (found["class"], found["hint"]) == ("ExistsError", "force")
-    assert found["message"].endswith(": it exists; use --force to replace it")
+    assert found["message"].endswith(": already exists; use --force to replace it")
 
 
 @pytest.mark.parametrize("name", [*COMMANDS, "stream encode", "stream decode", ""])

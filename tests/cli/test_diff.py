@@ -297,7 +297,12 @@ def test_who_stands_how_fast_and_where_up_is(foot_files: tuple[Path, Path], call
     found = call("diff", *foot_files, "--feet", "head, lfoot", "--json").document["clips"][0]
     assert found["feet"]["joints"] == ["head", "lfoot"]
     assert found["contacts"] == 2
-    fails(call("diff", *foot_files, "--feet", "hand"), 1, "a.mcz", "no joint 'hand'")
+    fails(
+        call("diff", *foot_files, "--feet", "hand"),
+        1,
+        "a.mcz",
+        "no joint 'hand'",
+    )
     fails(call("diff", *foot_files, "--rate", "fast"), 2, "fast")
 
 
@@ -309,7 +314,7 @@ def test_without_feet_nothing_is_said_unless_asked(tmp_path: Path, call: Call) -
     assert "contacts of" not in out and "feet:" not in out
     _, out, _ = call("diff", *pair, "--contacts")
     assert (
-        "note: no joint is a foot by its name: no contacts; name the joints of feet (--feet)" in out
+        "note: no joint is named like a foot: no contacts; name the joints of feet (--feet)" in out
     )
     clip = call("diff", *pair, "--contacts", "--json").document["clips"][0]
     assert (clip["feet"], clip["contacts"], clip["contact_list"]) == (None, None, [])

@@ -224,7 +224,7 @@ def test_a_row_that_may_mean_two_clips_says_how_to_be_exact(folder: Path, call: 
     Path("t.csv").write_text("clip,x-day,subject\nrun,1,05\n")
     code, _, errors = call("meta", "days.mcz", "--from", "t.csv")
     assert code == 2
-    assert "t.csv: row 2: 'run' may be 1/run, 2/run; write one of these" in errors
+    assert "write one of these names, or build it from more columns with match, such as" in errors
     words = ("--match", "{x-day}/{clip}", "--take", "subject")
     assert call("meta", "days.mcz", "--from", "t.csv", *words)[0] == 0
     assert call("meta", "days.mcz", "--clip", "1/run")[1] == "1/run:\n  subject: 05\n"
@@ -300,8 +300,11 @@ def test_answers_to_wrong_words_name_the_right_ones(folder: Path, call: Call) ->
     for words, answer in (
         (("encode", "walk.bvh", "--codec", "losy"), "did you mean 'lossy'?"),
         (("encode", "walk.bvh", "walk.c3d"), "mcz pack takes a folder of them, mcz append several"),
-        (("list", "walk.bvh"), "not an MCZ file: it begins with 'HIERARCH'; mcz encode makes one"),
-        (("unpack", "walk.bvh", "out"), "; mcz encode makes one of a source file"),
+        (
+            ("list", "walk.bvh"),
+            "not an MCZ file: it begins with 'HIERARCH'; encode a source file with mcz encode",
+        ),
+        (("unpack", "walk.bvh", "out"), "; encode a source file with mcz encode"),
         (("encode", "all.mcz"), "all.mcz: is an .mcz already; mcz append adds it to another"),
     ):
         code, out, errors = call(*words)

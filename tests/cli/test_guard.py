@@ -49,7 +49,7 @@ def test_encode_keeps_its_source(folder: Path, call: Call) -> None:
     for target in names_of(source):
         code, out, errors = call("encode", source, "-o", target, "--force")
         assert (code, out) == (2, "")
-        assert "it is the input itself" in errors
+        assert "the output is the input itself" in errors
         with pytest.raises(OptionError, match="the input itself"):
             mcz.encode(source, target, force=True)
         assert target.read_bytes() == before
@@ -65,7 +65,7 @@ def test_encode_keeps_the_skeleton(folder: Path, call: Call) -> None:
     for options in ((), ("--skeleton", asf)):  # found, or given
         code, _, errors = call("encode", folder / "walk.amc", "-o", asf, "--force", *options)
         assert code == 2
-        assert "it is the input itself" in errors
+        assert "the output is the input itself" in errors
     assert asf.read_bytes() == before
     assert not list(folder.glob("*.part"))
 
@@ -76,7 +76,7 @@ def test_encode_keeps_the_file_of_a_parameter(folder: Path, call: Call) -> None:
     assert call("train", folder / "walk.c3d", "-o", basis, "--iterations", 1)[0] == 0
     before = basis.read_bytes()
     code, _, errors = call(*words, "-o", basis, "--force")
-    assert (code, "it is the input itself" in errors) == (2, True)
+    assert (code, "the output is the input itself" in errors) == (2, True)
     assert basis.read_bytes() == before
 
 
@@ -95,7 +95,11 @@ def test_other_commands_keep_their_input(archive_path: Path, folder: Path, call:
         ):
             code, out, errors = call(*words)
             assert (code, out, errors.count("\n")) == (2, "", 1), words
-            said = "not overwritten" if words[0] == "repair" else "it is the input itself"
+            said = (
+                "the output is the damaged file itself; name another output"
+                if words[0] == "repair"
+                else "the output is the input itself"
+            )
             assert said in errors
     assert archive_path.read_bytes() == before
 
@@ -111,7 +115,7 @@ def test_pack_keeps_what_it_packs(folder: Path, call: Call) -> None:
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     code, _, errors = call("pack", folder, folder / "walk.bvh", "--force")
     assert code == 2
-    assert "it is the input itself" in errors
+    assert "the output is the input itself" in errors
     (folder / "x.mcz").symlink_to(folder / "walk.bvh")
     assert call("pack", folder, folder / "x.mcz", "--force")[0] == 2
     (folder / "x.mcz").unlink()
@@ -129,7 +133,7 @@ def test_unpack_keeps_its_archive(tmp_path: Path, call: Call) -> None:
     before = (tmp_path / "all.mcz").read_bytes()
     code, _, errors = call("unpack", tmp_path / "all.mcz", tmp_path, "--force")
     assert code == 1
-    assert "it is the input itself" in errors
+    assert "the output is the input itself" in errors
     assert (tmp_path / "all.mcz").read_bytes() == before
 
 
@@ -193,7 +197,7 @@ def test_all_outputs_or_none(folder: Path, call: Call) -> None:
     words = ("decode", folder / "p.mcz", "--to", "amc", "--solve-ik", "--with-skeleton", "-o")
     for target in (folder / "out", folder / "out" / "x.amc"):
         code, _, errors = call(*words, target)
-        assert (code, "walk.asf: it exists; use --force" in errors) == (2, True)
+        assert (code, "walk.asf: already exists; use --force" in errors) == (2, True)
         assert [path.name for path in (folder / "out").iterdir()] == ["walk.asf"]
     assert (folder / "out" / "walk.asf").read_bytes() == b"mine"
 

@@ -93,14 +93,14 @@ def test_what_is_refused(markers: Path, samples: Path, tmp_path: Path, call: Cal
     for arguments in ((), ("--to", "bvh"), ("--to", "csv")):
         code, _, err = call("decode", angles, "--post-filter", *arguments)
         assert code not in (0, 2)
-        assert "not one of markers alone" in err
+        assert "the post filter works on markers, and motion" in err
         assert len(err.splitlines()) == 1
     unknown = replace(mcz.post_filter(read_motion(markers)), frame_rate=None)
     mcz.write(unknown, tmp_path / "unknown.mcz")
     arguments = ("decode", tmp_path / "unknown.mcz", "--to", "csv", "-o", tmp_path / "u.csv")
     code, _, err = call(*arguments, "--post-filter")
     assert code == 2
-    assert "give the rate (--rate)" in err
+    assert "set the frame rate (--rate)" in err
     assert call(*arguments, "--post-filter", "--rate", "120")[0] == 0
     assert call(*arguments, "--force", "--rate", "120")[0] == 2
     bare = tmp_path / "bare.mcz"

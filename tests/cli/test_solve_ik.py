@@ -173,9 +173,9 @@ def test_what_does_not_fit(walk: Motion) -> None:
         mcz.from_positions(few, bvh_walk().skeleton)
     with pytest.raises(MotionError, match="no positions to fit"):
         mcz.from_positions(walk, skeleton)
-    with pytest.raises(MotionError, match="has markers alone"):
+    with pytest.raises(MotionError, match="has only markers, so it cannot be fitted"):
         mcz.from_positions(few, marker_walk().skeleton)
-    with pytest.raises(OptionError, match="length unit is unknown"):
+    with pytest.raises(OptionError, match="length unit .*is unknown"):
         unknown = replace(walk, skeleton=replace(skeleton, unit_cm=None))
         mcz.in_positions(unknown, virtual_markers=True)
     scalars = Skeleton((Joint("root", channels=(Channel("", "1"),)),))

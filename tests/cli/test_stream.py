@@ -183,7 +183,7 @@ def test_parameters_change_by_a_line(tmp_path: Path) -> None:
         (NAMES + b"1,2\n", "line 2: 2 values of 6"),
         (NAMES + line(ROWS[0]) + b"1,2,3,4,5,x\n", "line 3"),
         (NAMES + b"1,2,3,4,5,1_000\n", "line 2: a value with _ in it"),
-        (b"a.x,a.z,a.y\n", "not x, y and z"),
+        (b"a.x,a.z,a.y\n", "... must name x, y and z of each marker in turn"),
     ],
 )
 def test_bad_rows(data: bytes, message: str) -> None:

@@ -179,7 +179,7 @@ def test_c3d_keeps_gaps_that_only_nan_marks(tmp_path: Path, processor: int) -> N
 
 @pytest.mark.parametrize("T_g", [0, 0.0, 1e-35])
 def test_a_step_is_needed(T_g: float) -> None:
-    with pytest.raises(mcz.OptionError, match="T_g is .* and Q is not given"):
+    with pytest.raises(mcz.OptionError, match="with T_g=.* there is no quantizer step; give Q"):
         encode_file(smooth(20), T_g=T_g)
 
 

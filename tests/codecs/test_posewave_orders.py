@@ -119,7 +119,7 @@ def test_codec() -> None:
     assert np.abs(error).max() < 1
     wild = values.copy()
     wild[7, 3] = 2.0**40
-    with pytest.raises(MotionError, match="an angle of"):
+    with pytest.raises(MotionError, match="an angle is"):
         encode_segment(header, skeleton, wild, choice.weights)
 
 

@@ -221,7 +221,7 @@ def test_a_step_is_needed(limit: float) -> None:
 
 
 def test_fewest_breaks_need_marks_near_each_other() -> None:
-    with pytest.raises(mcz.OptionError, match="breaks fewest need a delta of at most 512"):
+    with pytest.raises(mcz.OptionError, match="breaks=fewest allows delta up to 512"):
         encode_file(smooth(20), breaks="fewest", delta=513)
 
 

@@ -157,7 +157,7 @@ def test_a_member_that_is_there_twice_is_refused(other: str) -> None:
         Member(name, npy(np.full((3, 2), value)))
         for value, name in enumerate(("a.npy", "b.npy", other))
     ]
-    with pytest.raises(SourceError, match="'a' is there twice"):
+    with pytest.raises(SourceError, match="two members have the name 'a'"):
         FORMATS["npz"].read(npz(members))
     FORMATS["npz"].read(npz(members[:2]))
 
@@ -370,10 +370,10 @@ def test_a_model_file_says_how_long_bones_are(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "model", "message"),
     [
-        ({}, "model_{gender}.npz", "states no gender"),
-        ({"gender": "../x"}, "model_{gender}.npz", "states no gender, but '../x'"),
-        ({"betas": np.arange(6.0)}, "model_female.npz", "6 betas, and the model has 4"),
-        ({"betas": np.eye(3)}, "model_female.npz", "more than one shape of a body"),
+        ({}, "model_{gender}.npz", "the gender of the take is"),
+        ({"gender": "../x"}, "model_{gender}.npz", "the gender of the take is '../x', so"),
+        ({"betas": np.arange(6.0)}, "model_female.npz", "6 betas are given, but the model has 4"),
+        ({"betas": np.eye(3)}, "model_female.npz", "holds more than one body shape"),
         ({}, "missing.npz", "No such file"),
     ],
 )
@@ -423,7 +423,7 @@ def test_somebody_says_what_plain_arrays_are(tmp_path: Path) -> None:
                 clip = file.only_clip()
                 assert clip.source_bytes() == path.read_bytes()
                 assert clip.skeleton.channels == motion.skeleton.channels
-    with pytest.raises(MotionError, match="3 numbers a joint, but there are 4"):
+    with pytest.raises(MotionError, match="have 3 numbers a joint, but the array has 4"):
         path.write_bytes(npy(floats(6, 5, 4)))
         mcz.read(path, arrays="positions")
     with pytest.raises(OptionError, match="one of positions"):
@@ -451,7 +451,7 @@ def test_files_without_a_motion_are_refused_with_the_reason() -> None:
     cases = {
         npy(np.array(3.0)): "a single number",
         npy(floats(16)): "no array has a row for each frame; 'array' is of shape",
-        npy(floats(3, 0)): r"of shape \(3, 0\)",
+        npy(floats(3, 0)): r"is of shape",
         npy(np.zeros((3, 2), complex)): "of type c16",
         npy(floats(3, 2))[:-1]: "offset 128: 47 bytes of numbers",
         npy(np.full((2, 2), 2**60)): "an integer beyond 2\\^53",
@@ -523,4 +523,4 @@ def test_commands_say_what_is_read_and_what_is_kept(
     }  # fmt: skip
     assert [array["name"] for array in clip["arrays"]] == ["points", "betas", "steps", "old"]
     assert run("encode", path, "--arrays", "quaternions-wxyz", "--force") == 1
-    assert "4 numbers a joint, but there are 3" in capsys.readouterr().err
+    assert "have 4 numbers a joint, but the array has 3" in capsys.readouterr().err

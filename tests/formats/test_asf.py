@@ -49,9 +49,9 @@ def test_other_lengths_have_an_unknown_unit() -> None:
         ("zyx", "zyz", "line 14: axis order 'ZYZ'"),
         ("angle rad", "angle gon", "line 38: angle unit 'gon'"),
         ("name a\n", "name toe\n", "line 24: a bone without a name of its own"),
-        ("a toe", "a toe missing", "hierarchy: a missing: no such bone"),
+        ("a toe", "a toe missing", "hierarchy: a missing: no bone has this name"),
         ("a toe", "a b toe", "two parents"),
-        ("root a", "toe a", "a circle of bones"),
+        ("root a", "toe a", "hierarchy: these bones form a cycle"),
         ("  begin\n     name a", "     name a", "line 19: 'name' outside"),
     ],
 )

@@ -139,11 +139,13 @@ def test_models_that_do_not_fit(tmp_path: Path) -> None:
     path = model(tmp_path / "model.npz")
     with pytest.raises(OptionError, match="24 joints; expected 52"):
         offsets_of_model(path, 52)
-    with pytest.raises(OptionError, match="12 betas, and the model has 10"):
+    with pytest.raises(OptionError, match="12 betas are given, but the model has 10"):
         offsets_of_model(path, 24, np.ones(12))
     with pytest.raises(OptionError, match="a row of finite numbers"):
         offsets_of_model(path, 24, np.ones((1, 10)))
-    with pytest.raises(OptionError, match="joint 23 hangs on joint 22, and 'right_hand' of SMPL"):
+    with pytest.raises(
+        OptionError, match="joint 23 is a child of joint 22, but 'right_hand' of SMPL is a child of"
+    ):
         offsets_of_model(model(tmp_path / "h.npz", 52), 24)
     with pytest.raises(AccessError, match="No such file"):
         offsets_of_model(tmp_path / "none.npz", 24)
@@ -161,9 +163,9 @@ def test_models_that_do_not_fit(tmp_path: Path) -> None:
         if name == "kintree_table":
             array[0, 3] = 7  # type: ignore[index]
         file = model(tmp_path / f"{name}.npz", **{name: array}, drop=drop)
-        with pytest.raises(SourceError, match="shape|hangs on"):
+        with pytest.raises(SourceError, match="shape|must precede it"):
             offsets_of_model(file, 24, None if name == "J" else [1.0])
-    with pytest.raises(SourceError, match="of type <U4, not numbers"):
+    with pytest.raises(SourceError, match="the type is <U4, not a number"):
         offsets_of_model(model(tmp_path / "text.npz", J=np.array(["text"])), 24)
 
 
@@ -185,7 +187,7 @@ def test_hostile_models(tmp_path: Path) -> None:
     )
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("kintree_table.npy", huge.getvalue())
-    with pytest.raises(SourceError, match="are not there"):
+    with pytest.raises(SourceError, match="bytes of shape"):
         offsets_of_model(file, 22)
 
 
@@ -208,7 +210,7 @@ def test_offsets_from_positions() -> None:
     noisy[7, 3] = np.nan
     off = offsets_from_positions(noisy, turns, body.parents, motion.values[:, :3])
     assert np.abs(off.offsets - offsets).max() < 0.02 and 0.01 < off.rms < off.greatest < 0.2
-    with pytest.raises(OptionError, match="for 22 joints"):
+    with pytest.raises(OptionError, match="do not fit 22 joints"):
         offsets_from_positions(places[:, :9], turns, body.parents)
     with pytest.raises(OptionError, match="translations of shape"):
         offsets_from_positions(places, turns, body.parents, np.zeros(3))

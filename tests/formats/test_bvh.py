@@ -207,14 +207,14 @@ def test_a_byte_order_mark_before_acclaim_hides_nothing(samples: Path) -> None:
     commented = mark + b"# of a program\n" + text
     assert asf.write(asf.read(commented)) == commented
     assert replace(asf.read(commented), source=None) == replace(asf.read(text), source=None)
-    with pytest.raises(SourceError, match="line 1: a byte order mark of UTF-8 hides ':units"):
+    with pytest.raises(SourceError, match="line 1: a UTF-8 byte order mark precedes ':units"):
         asf.read(mark + b":units\n" + text)
     frames = (samples / "walk.amc").read_bytes()
     first = re.search(rb"(?m)^1\s*$", frames)
     assert first is not None
     headless = frames[first.start() :]
     for hidden in (headless, b":RADIANS\n" + headless):
-        with pytest.raises(SourceError, match="a byte order mark of UTF-8 hides"):
+        with pytest.raises(SourceError, match="a UTF-8 byte order mark precedes"):
             amc.read(mark + hidden)
     motion = amc.read(mark + b"#!OML:ASF\n" + headless)
     assert amc.write(motion) == mark + b"#!OML:ASF\n" + headless

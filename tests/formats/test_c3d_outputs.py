@@ -177,7 +177,13 @@ def test_more_units_than_lists() -> None:
 
 @pytest.mark.parametrize(
     ("names", "message"),
-    [(("a x", "a y", "b z"), "'a x' does not"), (("p x", "p y", "p z"), "from points: ['p']")],
+    [
+        (("a x", "a y", "b z"), "'a x' does not"),
+        (
+            ("p x", "p y", "p z"),
+            "C3D distinguishes outputs from points only by name, and these are both",
+        ),
+    ],
 )
 def test_what_a_plain_file_cannot_list_is_refused(names: tuple[str, ...], message: str) -> None:
     joint = Joint("p", channels=tuple(Channel(kind) for kind in ("tx", "ty", "tz")))

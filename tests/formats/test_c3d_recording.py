@@ -165,7 +165,7 @@ def test_a_scaling_that_the_source_does_not_say_is_refused() -> None:
     assert analog.scaling is not None
     other = analog.in_units(replace(analog.scaling, general=3.0))
     motion = replace(motion, signals=(*motion.signals[:2], other))
-    with pytest.raises(MotionError, match="'analog': its source has another scaling"):
+    with pytest.raises(MotionError, match="'analog' and its source have different scalings"):
         mcz.write(motion, io.BytesIO())
 
 

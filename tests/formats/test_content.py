@@ -87,7 +87,7 @@ def test_tables_stay_tables(tmp_path: Path, data: bytes) -> None:
 def test_content_that_is_no_other_format_is_refused_by_its_suffix(tmp_path: Path) -> None:
     (tmp_path / "t.c3d").write_bytes(b"no motion\n")
     assert likely_formats(b"no motion\n") == ()
-    with pytest.raises(mcz.SourceError, match="the end of a C3D header"):
+    with pytest.raises(mcz.SourceError, match="the file is truncated in its C3D header"):
         mcz.read(tmp_path / "t.c3d")
 
 

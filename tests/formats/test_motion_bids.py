@@ -79,12 +79,16 @@ def test_a_table_without_side_files_is_read_as_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("channels", "about", "fault"),
     [
-        (positions() + "more\tx\tPOS\tmore\tmm\n", None, "7 channels for the 6 columns"),
-        (HEADER + "\tx\tPOS\ttoe\tmm\n" * 6, None, "a channel without a name"),
-        (positions(), [], "no object with a SamplingFrequency"),
-        (positions(), {"SamplingFrequency": "often"}, "no object with a SamplingFrequency"),
-        (positions(), {"SamplingFrequency": 0}, "a SamplingFrequency of 0 Hz"),
-        (positions(), {"SamplingFrequency": 1e300}, "a SamplingFrequency of 1e[+]300 Hz"),
+        (positions() + "more\tx\tPOS\tmore\tmm\n", None, "7 channels are listed, but"),
+        (HEADER + "\tx\tPOS\ttoe\tmm\n" * 6, None, "a channel has no name"),
+        (positions(), [], "not an object with a SamplingFrequency in hertz"),
+        (
+            positions(),
+            {"SamplingFrequency": "often"},
+            "not an object with a SamplingFrequency in hertz",
+        ),
+        (positions(), {"SamplingFrequency": 0}, "SamplingFrequency is 0 Hz"),
+        (positions(), {"SamplingFrequency": 1e300}, "SamplingFrequency is 1e"),
     ],
 )
 def test_side_files_that_do_not_fit_are_refused(
@@ -197,9 +201,13 @@ def test_what_bids_does_not_have(tmp_path: Path) -> None:
     mcz.merge(paths, tmp_path / "all.mcz")
     report = mcz.export(tmp_path / "all.mcz", tmp_path / "out", "bids")
     reasons = [outcome.message for outcome in report.failures]
-    assert ["another clip becomes" in reason for reason in reasons] == [True, False, False]
+    assert ["another clip is also written to" in reason for reason in reasons] == [
+        True,
+        False,
+        False,
+    ]
     assert "BIDS requires a frame rate" in reasons[1]
-    assert "no motion of joints or points" in reasons[2]
+    assert "the motion has neither joints nor points" in reasons[2]
     assert (tmp_path / "out" / "README").exists()
 
 

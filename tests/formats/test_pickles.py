@@ -125,7 +125,7 @@ def test_a_single_clip() -> None:
     motion = read(pickle.dumps({"day/walk": clip}))
     assert motion.metadata["x-clip"] == "day/walk" and motion.n_frames == 60
     assert read(pickle.dumps([[clip]])).n_frames == 60
-    with pytest.raises(mcz.OptionError, match="'walk' is no library of clips"):
+    with pytest.raises(mcz.OptionError, match="motion 'walk' is not a library of clips"):
         mcz.split_clips(motion)
 
 
@@ -380,10 +380,14 @@ def test_names_are_refused() -> None:
         with pytest.raises(SourceError):
             read(b"\x80\x04(" + text.encode() + b"l.")
     for opcode in (b"ios\nsystem\n", b"\x82\1", b"\x83\1\0", b"\x84\1\0\0\0", b"Pid\n", b"NQ"):
-        with pytest.raises(SourceError, match="is never obeyed"):
+        with pytest.raises(
+            SourceError, match="would create an object of a program, which is never done"
+        ):
             read(b"(" + opcode + b".")
     for opcode in (b"\x97", b"N\x98"):
-        with pytest.raises(SourceError, match="is never obeyed"):
+        with pytest.raises(
+            SourceError, match="would create an object of a program, which is never done"
+        ):
             read(b"\x80\5" + opcode + b".")
 
 
@@ -505,9 +509,11 @@ def test_files_of_torch_that_are_refused() -> None:
     with pytest.raises(SourceError, match="a ZIP that has data.pkl"):
         read_tensors(b"none")
     data = tensor_file(floats(4, 2).astype("<f4"))
-    with pytest.raises(SourceError, match="'posix.FloatStorage' is no part of an array"):
+    with pytest.raises(
+        SourceError, match="'posix.FloatStorage' does not belong to arrays, and is never called"
+    ):
         read_tensors(data.replace(b"ctorch\nFloat", b"cposix\nFloat"))
-    with pytest.raises(SourceError, match="'torch._utils._rebuild_tensor_v2' is no part"):
+    with pytest.raises(SourceError, match="'torch._utils._rebuild_tensor_v2' does not belong to"):
         read(b"\x80\2ctorch._utils\n_rebuild_tensor_v2\n.")
     for at in range(len(data)):
         for changed in (data[:at] + bytes((data[at] ^ 0x81,)) + data[at + 1 :], data[:at]):

@@ -74,21 +74,23 @@ def test_a_storage_file_says_its_columns() -> None:
 
 REFUSED = {
     "trc": {
-        b"": "no line that begins with Frame#",
-        b"PathFileType\t4\n": "no line that begins with Frame#",
+        b"": "no line begins with Frame#; not a TRC file, or truncated",
+        b"PathFileType\t4\n": "no line begins with Frame#; not a TRC file, or truncated",
         b"Frame#\tTime\tA\n\t\tX1\n": "line 2: no row of numbers",
         b"Frame#\tTime\tA\n1\t0\t1\t2\t3\nnothing\n": "line 3: not a row of numbers",
         b"Frame#\tTime\tA\n1\t0\t1\t2\tx\n": "line 2: 'x' is not a number",
-        b"Frame#\tTime\tA\n1.5\t0\t1\t2\t3\n": "is no frame number",
+        b"Frame#\tTime\tA\n1.5\t0\t1\t2\t3\n": "is not a frame number, or too large",
         b"\xff\xfeF\0": "UTF-16",
     },
     "sto": {
         b"": "no line 'endheader'",
-        b"name\nendheader\n": "no names and row of numbers",
+        b"name\nendheader\n": "names and a row of numbers must follow endheader",
         b"endheader\ntime\ta\n0\t1\n1\t2\t3\n": "line 4: more than 2 cells",
-        b"endheader\ntime\ta\n0\t1,2,3\n1\t1,2\n": "line 4: 2 numbers in a cell, expected 3",
+        b"endheader\ntime\ta\n0\t1,2,3\n1\t1,2\n": "line 4: 2 numbers in a cell; expected 3",
         b"endheader\ntime\ta\n0\t1\n# end\n": "line 4: not a row of numbers",
-        b"endheader\ntime\ta\n0," + b"1," * 99 + b"1\t2\n": "101 numbers in a cell, limit 64",
+        b"endheader\ntime\ta\n0,"
+        + b"1," * 99
+        + b"1\t2\n": "101 numbers in a cell exceed the limit of 64",
     },
 }
 

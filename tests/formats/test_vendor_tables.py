@@ -184,7 +184,7 @@ def test_a_time_code_costs_little() -> None:
 def test_texts_that_have_no_pattern_are_refused() -> None:
     words = (f"{''.join(chr(97 + k // 26**n % 26) for n in range(3))}" for k in range(1200))
     text = "time,x,word\n" + "".join(f"{k},{k},{word}\n" for k, word in enumerate(words))
-    with pytest.raises(SourceError, match="column 3 differ in more than 1024 ways"):
+    with pytest.raises(SourceError, match="the texts of column 3 follow more than 1024 patterns"):
         FORMATS["csv"].read(text.encode(), "table")
 
 
@@ -193,7 +193,7 @@ def test_long_digits_do_not_take_columns_of_every_row() -> None:
     rows[7] = f"7,7,a{'07' * 50_000}"
     tracemalloc.start()
     try:
-        with pytest.raises(SourceError, match="more than 1024 ways"):
+        with pytest.raises(SourceError, match="more than 1024 patterns"):
             FORMATS["csv"].read("\n".join(["time,x,id", *rows]).encode(), "table")
         assert tracemalloc.get_traced_memory()[1] < 2**27
     finally:
@@ -309,7 +309,7 @@ REFUSED = {
     b"time,a,b\n0,1,2\ntime,a,b\n1,2,3\n2,3,4\n": "line 3: 'time' is not a number",
     b"name,age\nAnn,31\nBob,32\n": "column 'name' is text beside integers",
     b"time,a\n0,1\n1,error\n2,3\n": "line 3: 'error' is not a number",
-    b"time,label\n0,a\n1,b\n": "no column of numbers beside the times",
+    b"time,label\n0,a\n1,b\n": "there is no column of numbers besides the times",
 }
 
 

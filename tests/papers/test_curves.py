@@ -71,5 +71,5 @@ def test_without_a_unit_there_is_no_curve(samples: Path) -> None:
     task = Task("curve", Case(str(samples / "walk.bvh")), Variant("lsdt-clip"))
     found = perform(task, KINDS["curve"])
     assert "length unit" in found["error"]
-    with pytest.raises(OptionError, match="no rate to vary"):
+    with pytest.raises(OptionError, match="no parameter that varies its rate"):
         curve(Case(str(samples / "walk.amc")), Variant("raw"))

@@ -150,7 +150,7 @@ def test_visitors_may_come_back() -> None:
     ("words", "code", "said"),
     [
         (("none.bvh",), 1, "none.bvh: no such file"),
-        (("walk.asf",), 2, "its suffix is not one of"),
+        (("walk.asf",), 2, "unsupported suffix; it must be one of"),
         (("walk.bvh", "--host", "0.0.0.0"), 2, "this machine alone"),
         (("walk.bvh", "--port", "99999"), 2, "99999"),
         (("walk.bvh", "--codec", "lossy"), 2, "--codec applies only with -o"),
@@ -184,7 +184,7 @@ def test_an_installation_without_page_says_so(
     code, _, errors = call("view", samples / "walk.bvh", "--no-browser")
     assert (code, "none.html: No such file" in errors) == (1, True)
     (tmp_path / "none.html").write_bytes(b"\xff\xfe")
-    assert "it is no page" in call("view", samples / "walk.bvh", "--no-browser")[2]
+    assert "not a page of the viewer" in call("view", samples / "walk.bvh", "--no-browser")[2]
 
 
 # From Python ---------------------------------------------------------------------

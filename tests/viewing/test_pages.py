@@ -190,7 +190,7 @@ def test_an_input_is_no_page(samples: Path, tmp_path: Path, call: Call) -> None:
     before = (tmp_path / "walk.bvh").read_bytes()
     (tmp_path / "walk.html").symlink_to("walk.bvh")
     code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / "walk.html", "--force")
-    assert (code, "it is the input itself" in errors) == (2, True)
+    assert (code, "the output is the input itself" in errors) == (2, True)
     for other in ("walk.bvh", "walk.mp4"):
         code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / other, "--force")
         assert (code, "a page is a .html" in errors) == (2, True)

@@ -76,7 +76,7 @@ def pieces_of(data: bytes) -> Pieces:
     while at < len(data):
         if not data[at : at + 1].isalpha():
             if parse_foot(data[at : at + FOOT.size], at) is None:
-                raise FormatError(f"at {at} there is neither a chunk nor a FOOT")
+                raise FormatError(f"neither a chunk nor a FOOT begins at {at}")
             pieces.append(Piece(b"FOOT", 0, b"indexed" if indexed else b""))
             at += FOOT.size
             continue

@@ -64,10 +64,10 @@ def codes_of(lengths: Sequence[int], where: str) -> Ints:
     """
     used = [length for length in lengths if length]
     if any(length > MAX_LENGTH for length in used):
-        raise FormatError(f"{where}: a code of {max(used)} bits, at most {MAX_LENGTH}")
+        raise FormatError(f"{where}: a code has {max(used)} bits; at most {MAX_LENGTH} are allowed")
     room = sum(1 << (MAX_LENGTH - length) for length in used)
     if used not in ([], [1]) and room != 1 << MAX_LENGTH:  # PREFIX-04, PREFIX-05
-        raise FormatError(f"{where}: code lengths that make no whole code")
+        raise FormatError(f"{where}: the code lengths make no complete prefix code")
     codes = np.zeros(len(lengths), np.int64)
     code = 0
     for length in range(1, MAX_LENGTH + 1):

@@ -58,7 +58,7 @@ def uncode(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: bool) ->
     if not loop(state, data):
         raise FormatError(f"{what} is out of range")
     if whole and _coder().coded_size(state) != len(data):  # RANGE-04
-        raise FormatError(f"{what}: a stream of {len(data)} bytes takes another number")
+        raise FormatError(f"{what}: the stream should not have {len(data)} bytes")
 
 
 def scale_of(halves: int) -> int:

@@ -87,14 +87,16 @@ def plan_of_options(params: Params, layout: Layout) -> Plan:
     chosen, published = preset_values(PRESETS, params), params["preset"] == "khan2014"
     limit, decimals = chosen["d2_lmt"], chosen["Q"]
     if decimals is None and not limit > 0:
-        raise OptionError("qbc: d2_lmt is 0 and no Q is given, which leaves no step")
+        raise OptionError("qbc: with d2_lmt 0 there is no step; give Q")
     fewest = params["breaks"] == "fewest"
     if fewest and chosen["delta"] > FEWEST_MOST:
-        raise OptionError(f"qbc: breaks fewest need a delta of at most {FEWEST_MOST}")
+        raise OptionError(f"qbc: breaks=fewest allows delta up to {FEWEST_MOST}")
     step = STEP_SHARE * limit**0.5 if decimals is None else 1.0
     lever = _lever(layout.skeleton) if decimals is None else 1.0
     if step < LEAST_STEP or step * lever < LEAST_STEP:
-        raise OptionError(f"qbc: d2_lmt {limit} is too small for a step; Q says decimals")
+        raise OptionError(
+            f"qbc: d2_lmt {limit} is too small to derive a step; set the decimals with Q"
+        )
     return Plan(
         limit,
         chosen["delta"],

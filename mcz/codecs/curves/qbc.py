@@ -140,8 +140,8 @@ def _segment_length(layout: Layout, plan: Plan) -> int:
     delta, most = plan.delta, layout.most_frames
     if most < min(delta, layout.n_frames):
         raise OptionError(
-            f"qbc: delta {delta} is more than the {most} frames that a segment of "
-            f"{layout.n_channels} channels may have"
+            f"qbc: delta is {delta}, but a segment of {layout.n_channels} channels may have "
+            f"at most {most} frames"
         )
     length = -(-(plan.segment_frames or SEGMENT_FRAMES) // delta) * delta
     return max(delta, min(length, most // delta * delta))
@@ -220,20 +220,21 @@ def decode(
 def _check(fields: QbcHeader, layout: Layout, spans: Sequence[Span]) -> None:
     if layout.samples_per_frame != 1 or layout.n_resolutions > 2:  # QBC-01
         raise FormatError(
-            f"qbc: {layout.samples_per_frame} samples a frame, {layout.n_resolutions} resolutions"
+            f"qbc: {layout.samples_per_frame} samples a frame and {layout.n_resolutions} "
+            "resolutions are not allowed"
         )
     for span in spans:
         lead = min(span.first, fields.delta - 1)
         # QBC-06, QBC-08, QBC-09, QBC-10
         if span.first % fields.delta or (span.lead, span.tail, span.fresh) != (lead, 0, True):
             raise FormatError(
-                f"qbc: the segment at {span.first} bears upon {span.lead} frames before and "
-                f"{span.tail} after; marks are {fields.delta} frames apart"
+                f"qbc: the segment at {span.first} has lead {span.lead} and tail {span.tail}, "
+                f"which do not fit marks {fields.delta} frames apart"
             )
     end = spans[-1].stop if spans else 0
     # QBC-05, QBC-07
     if end > fields.coded_frames or (end < fields.coded_frames and end % fields.delta):
-        raise FormatError(f"qbc: segments end at {end} of {fields.coded_frames} frames")
+        raise FormatError(f"qbc: the segments end at frame {end} of {fields.coded_frames}")
 
 
 def _read_segment(

@@ -153,5 +153,5 @@ def parse_curves(stream: bytes, marks: Ints, frames: Ints, name: str, *, whole: 
 
 def _scale(stream: bytes, at: int, name: str) -> int:
     if at >= len(stream) or stream[at] > MAX_SCALE:  # QBC-16, QBC-22
-        raise FormatError(f"{name}: no scale at {at} of a stream of {len(stream)} bytes")
+        raise FormatError(f"{name}: a scale is missing at {at} of a stream of {len(stream)} bytes")
     return stream[at]

@@ -89,7 +89,7 @@ def decode(
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     refuse_extras("best", header, layout)  # BEST-01
     if len(layout.groups) > 1:  # BEST-02
-        raise FormatError(f"best: {len(layout.groups)} groups of channels")
+        raise FormatError(f"best: {len(layout.groups)} groups of channels are too many")
     shape = Shape(layout.grids, layout.groups)
 
     def rows(index: int, group: int) -> Ints:
@@ -212,7 +212,7 @@ class _Model:
             return False
         work = (len(self.references) + total) * (len(self.leads) - residual.BEHIND)
         if self.most_work is not None and work > self.most_work:  # BEST-12
-            raise FormatError("best: more references than its bytes pay for")
+            raise FormatError("best: too many references for the size of the stream")
         args = state, data, self.lanes, self.references, self._regressions(), self.echoes
         with np.errstate(all="ignore"):  # an estimate may be NaN
             return bool(own.code_leads(*args, self.leads, self.rests) < 0)
@@ -229,7 +229,7 @@ class _Model:
 def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     """Fill ``out`` (rows, channels) with the ordinals of a segment; raises FormatError."""
     if not stream or stream[0] > ECHOED:  # BEST-03
-        raise FormatError(f"best: method {stream[:1].hex() or 'missing'}")
+        raise FormatError(f"best: the method is {stream[:1].hex() or 'missing'}")
     decoder = SegmentDecoder(shape, (0,), lambda _: stream[1:], out, len(out))
     if stream[0] == AS_FAST:
         read_segments([decoder])
@@ -238,9 +238,9 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     lanes = decoder.lanes
     n_lanes = len(lanes.columns)
     if n_lanes == 0:  # BEST-04
-        raise FormatError("best: no channel is coded, and yet the method is not 0")
+        raise FormatError("best: the method must be 0 if no channel is coded")
     if (lanes.predictors.parents >= 0).any():  # BEST-05
-        raise FormatError("best: a channel with a parent")
+        raise FormatError("best: no channel may have a parent")
     (start, stop), (tail, end) = lanes.residuals[0] // 8, lanes.tails[0]
     bits = lanes.data[start:stop].tobytes()
     rests = own.Rests(np.zeros((len(out), n_lanes), np.int32), lanes.lattices[:, own.REST].copy())

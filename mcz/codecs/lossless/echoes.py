@@ -63,7 +63,7 @@ def read_echoes(data: bytes, n_rows: int, may_echo: Sequence[bool]) -> tuple[lis
     count, at = read_varint(data, 0)
     left = n_rows * len(may_echo)
     if not 1 <= count <= left:  # BEST-19
-        raise FormatError(f"best: {count} echoes")
+        raise FormatError(f"best: the number of echoes is {count}")
     echoes = []
     for _ in range(count):
         fields = []
@@ -71,29 +71,33 @@ def read_echoes(data: bytes, n_rows: int, may_echo: Sequence[bool]) -> tuple[lis
             field, at = read_varint(data, at)
             fields.append(field)
         if at >= len(data):
-            raise FormatError("best: the stream ends in the echoes")
+            raise FormatError("best: the stream is truncated within the echoes")
         if data[at] > MINUS:  # BEST-23
-            raise FormatError(f"best: flags {data[at]:#04x} of an echo")
+            raise FormatError(f"best: the flags of an echo are {data[at]:#04x}")
         row, rows, channel, channels, lag, source = fields
         echo = Echo(row, rows, channel, channels, lag, source, data[at] == MINUS)
         at += 1
         _check(echo, n_rows, may_echo)
         left -= echo.n_rows * echo.n_channels
         if left < 0:  # BEST-19
-            raise FormatError("best: more echoes than there are numbers")
+            raise FormatError("best: the echoes have more numbers than the segment")
         echoes.append(echo)
     return echoes, at
 
 
 def _check(echo: Echo, n_rows: int, may_echo: Sequence[bool]) -> None:
     if not 1 <= echo.n_rows <= n_rows - echo.row:  # BEST-20
-        raise FormatError(f"best: an echo in {echo.n_rows} of {n_rows} rows from {echo.row} on")
+        raise FormatError(
+            f"best: an echo of {echo.n_rows} rows from {echo.row} on exceeds the {n_rows} rows"
+        )
     if not 1 <= echo.lag <= echo.row:  # BEST-21
-        raise FormatError(f"best: an echo in row {echo.row} of what was {echo.lag} rows before")
+        raise FormatError(f"best: the echo at row {echo.row} cannot refer {echo.lag} rows back")
     for first in (echo.channel, echo.source):
         own = may_echo[first : first + echo.n_channels]
         if not 1 <= echo.n_channels == len(own) or not all(own):  # BEST-22
-            raise FormatError(f"best: an echo of {echo.n_channels} channels from {first} on")
+            raise FormatError(
+                f"best: an echo cannot have {echo.n_channels} channels from {first} on"
+            )
 
 
 def echo_table(echoes: Sequence[Echo], n_rows: int, n_channels: int) -> Ints:

@@ -59,9 +59,12 @@ def parse_online_header(header: bytes) -> OnlineHeader:
     """The fields of OnlineHeader; raises FormatError."""
     fields = parse(OnlineHeader, header, f"{NAME} header")
     if fields.space.flags & (MEAN | COURSES):  # ONLINE-04
-        raise FormatError(f"{NAME}: flags {fields.space.flags:#x}, it has no mean or courses")
+        raise FormatError(
+            f"{NAME}: flags {fields.space.flags:#x} announce a mean or courses, which it does "
+            "not have"
+        )
     if fields.order == REORDERED and fields.space.flags & APART:  # ONLINE-05
-        raise FormatError(f"{NAME}: x, y and z are apart and reordered")
+        raise FormatError(f"{NAME}: x, y and z cannot be both apart and reordered")
     return fields
 
 
@@ -70,7 +73,9 @@ def _space(fields: OnlineHeader, layout: Layout) -> Space:
     if fields.order == AS_IS:  # ONLINE-07
         return space
     if layout.n_channels % N_COORDINATES:  # ONLINE-06
-        raise FormatError(f"{NAME}: {layout.n_channels} channels are not three coordinates each")
+        raise FormatError(
+            f"{NAME}: {layout.n_channels} channels are not a multiple of three coordinates"
+        )
     columns = space.columns.reshape(-1, N_COORDINATES).T.reshape(1, -1)  # ONLINE-07
     return replace(space, columns=np.ascontiguousarray(columns))  # ONLINE-07
 
@@ -121,8 +126,7 @@ class Coder:
                 raise FormatError(f"{NAME}: frame {self.at + fault} is out of range")
             if _coding().coded_size(self._state) != len(data):  # ONLINE-23
                 raise FormatError(
-                    f"{NAME}: the unit at frame {self.at}: its {len(data)} bytes are not what its "
-                    "bits take"
+                    f"{NAME}: the unit at frame {self.at} should not have {len(data)} bytes"
                 )
         except FormatError:
             self._reference[:], self._memory[:] = before
@@ -133,11 +137,12 @@ class Coder:
 
     def _check(self, unit: Unit) -> None:
         if unit.kind == STR and not self._whole:  # ONLINE-26
-            raise LostFrameError(f"{NAME}: frame {self.at} needs the one before, which is lost")
+            raise LostFrameError(f"{NAME}: frame {self.at} needs the previous frame, which is lost")
         # ONLINE-14, ONLINE-27
         if unit.kind == LTR and (self._ltr is None or self.distance() != unit.distance):
             raise LostFrameError(
-                f"{NAME}: frame {self.at} needs that {unit.distance} before, lost or no LTR"
+                f"{NAME}: frame {self.at} needs the LTR frame {unit.distance} frames before, "
+                "which is lost or no LTR"
             )
 
     def encode(self, kind: int, frames: Floats, n_group: int, threshold: float, plan: Any) -> Unit:

@@ -190,7 +190,9 @@ def _needed_units(spans: Sequence[Span], request: Request, fetch: Fetch) -> list
         at = span.first
         units = parse_units(NAME, fetch(index, 0, 0), span.n_frames)
         if span.fresh != (units[0].kind == INTRA):  # ONLINE-13
-            raise FormatError(f"{NAME}: the segment at {at} begins with kind {units[0].kind}")
+            raise FormatError(
+                f"{NAME}: the segment at {at} must not begin with kind {units[0].kind}"
+            )
         for unit in units:
             if unit.kind == INTRA and at <= request.start:
                 needed.clear()
@@ -230,7 +232,7 @@ class _LiveEncoder(LiveEncoder):
         fixed = sorted(set(options) - CHANGEABLE)
         if fixed:
             raise OptionError(
-                f"{NAME}: {fixed[0]} cannot change while frames come; "
+                f"{NAME}: {fixed[0]} cannot change within a stream; "
                 f"{', '.join(sorted(CHANGEABLE))} can"
             )
         self._writer.change(options)
@@ -249,7 +251,7 @@ class _LiveDecoder:
         try:
             (unit,) = parse_units(NAME, stream, 1)
             if fresh != (unit.kind == INTRA):
-                raise FormatError(f"{NAME}: frame {self._coder.at} is of kind {unit.kind}")
+                raise FormatError(f"{NAME}: frame {self._coder.at} must not be of kind {unit.kind}")
         except FormatError:
             self._coder.skip(1)
             raise

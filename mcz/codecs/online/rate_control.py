@@ -88,7 +88,8 @@ def set_plan(plan: Plan, chosen: Params, layout: Layout, step: float) -> None:
     if mode != "mod":
         if layout.frame_rate is None or not layout.frame_rate:
             raise OptionError(
-                "online: a bitrate needs a frame rate, this motion states none", hint=Hint.RATE
+                "online: a bitrate needs a frame rate, which this motion does not state",
+                hint=Hint.RATE,
             )
         per_frame = float(Fraction(1000) / layout.frame_rate)
         numbers[kernels.BUFFER] = max(1.0, chosen["buffer"] * float(layout.frame_rate))
@@ -211,9 +212,9 @@ def settle_options(params: Params) -> Settings:
     if controlled and chosen["bitrate"] is None:
         raise OptionError(f"{NAME}: rate_control {chosen['rate_control']} needs a bitrate")
     if not controlled and chosen["bitrate"] is not None:
-        raise OptionError(f"{NAME}: rate_control mod keeps its step, and has no bitrate")
+        raise OptionError(f"{NAME}: rate_control mod keeps its step; leave out bitrate")
     if controlled and chosen["step"] is not None:
-        raise OptionError(f"{NAME}: with a bitrate the steps follow from it; leave out step")
+        raise OptionError(f"{NAME}: a bitrate determines the steps; leave out step")
     return chosen
 
 
@@ -224,7 +225,7 @@ def choose_options(sample: Sample, chosen: Params) -> tuple[Choice, int]:
     if chosen["order"] == "reordered" and sample.apart:
         # One matrix of all channels, as published.
         if which not in ("auto", "cosines"):
-            raise OptionError(f"{NAME}: order reordered has cosines only, not basis {which}")
+            raise OptionError(f"{NAME}: order reordered allows only basis cosines, not {which}")
         sample, which, order = replace(sample, apart=False), "cosines", REORDERED
     elif which == "auto":
         which = space_choices.basis_at_hand(sample)  # as live, so that a file equals its stream
@@ -238,7 +239,7 @@ def choose_live_options(layout: Layout, chosen: Params) -> tuple[Choice, int]:
     sample, _ = space_choices.live_sample(NAME, layout, chosen["basis"])
     step = chosen["step"]
     if step is None and chosen["bitrate"] is None:
-        raise OptionError(f"{NAME}: step or bitrate has to be given, for no frame is known yet")
+        raise OptionError(f"{NAME}: a live stream needs a step or a bitrate")
     if step is None:
         unit = layout.skeleton.unit_cm if layout.skeleton is not None else None
         step = min(max(FLOOR_CM / (unit or 1.0), space_choices.LEAST), space_choices.MOST)

@@ -115,13 +115,14 @@ def decode(
 def _check(layout: Layout, spans: Sequence[Span]) -> None:
     if layout.samples_per_frame != 1 or layout.n_resolutions != 1:  # PCA-02
         raise FormatError(
-            f"pca: {layout.samples_per_frame} samples a frame, {layout.n_resolutions} resolutions"
+            f"pca: {layout.samples_per_frame} samples a frame and {layout.n_resolutions} "
+            "resolutions are not allowed"
         )
     if len(layout.groups) > 1:  # PCA-01
-        raise FormatError(f"pca: {len(layout.groups)} groups, it has one")
+        raise FormatError(f"pca: the codec has one group, not {len(layout.groups)}")
     for span in spans:
         if (span.lead, span.tail, span.fresh) != (0, 0, True):  # PCA-03, PCA-04
-            raise FormatError(f"pca: the segment at {span.first} bears upon others")
+            raise FormatError(f"pca: the segment at {span.first} must not have a lead or tail")
 
 
 def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, n_frames: int) -> Floats:

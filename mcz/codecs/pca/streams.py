@@ -83,10 +83,12 @@ def parse_stream(
     step, mean_scale = _byte(stream, 0) if scaled else 0, _byte(stream, at)
     count, at = read_varint(stream, at + 1)
     if count > min(n_channels, n_frames + 1):  # PCA-06
-        raise FormatError(f"pca: {count} components of {n_channels} channels, {n_frames} frames")
+        raise FormatError(
+            f"pca: {count} components are too many for {n_channels} channels and {n_frames} frames"
+        )
     sides = stream[at : at + 2 * count]
     if len(sides) < 2 * count:
-        raise FormatError(f"pca: a stream of {len(stream)} bytes ends in its head")
+        raise FormatError(f"pca: a stream of {len(stream)} bytes is truncated in its head")
     if max(sides[:count], default=0) > MAX_SHIFT or mean_scale > MAX_SCALE:  # PCA-07, PCA-08
         raise FormatError(f"pca: a scale of {mean_scale} or a shift is out of range")
     if any(form & 63 > MAX_SCALE for form in sides[count:]):  # PCA-07
@@ -133,5 +135,5 @@ def _loop(
 
 def _byte(stream: bytes, at: int) -> int:
     if at >= len(stream):
-        raise FormatError(f"pca: a stream of {len(stream)} bytes ends in its head")
+        raise FormatError(f"pca: a stream of {len(stream)} bytes is truncated in its head")
     return stream[at]

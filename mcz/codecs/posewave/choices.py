@@ -143,8 +143,8 @@ def _contacts(
     skeleton, rate = skeleton_of(NAME, source.layout), source.layout.frame_rate
     if skeleton.unit_cm is None:
         raise OptionError(
-            f"contacts: skeleton {skeleton.name!r}: its length unit is unknown, and a tolerance is "
-            "in cm",
+            f"contacts: the length unit of skeleton {skeleton.name!r} is unknown, but the "
+            "tolerance is in cm",
             hint=Hint.UNIT,
         )
     tolerance = params["contact_tolerance"] * in_cm
@@ -161,7 +161,7 @@ def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) 
     unit = skeleton.unit_cm
     if step is None:
         if bound_cm is None or not unit or not has_kinematics(skeleton, whole=True):
-            raise OptionError(f"{NAME}: step has to be given, for lengths in cm are not known")
+            raise OptionError(f"{NAME}: lengths in cm are unknown, so a step must be given")
         step = STEP_OF_BOUND * bound_cm
     own = step / (unit or 1.0)
     step_cm = own * (unit or RADIUS_CM / PROPORTION / _extent(skeleton))

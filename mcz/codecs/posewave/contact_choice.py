@@ -69,11 +69,13 @@ def parse_runs(given: Any) -> Runs:
         runs = tuple((str(name), int(first), int(count)) for name, first, count in given)
     except (TypeError, ValueError):
         raise OptionError(
-            f"contacts are {given!r}, not auto and not like lfoot,rfoot:160+52"
+            f"contacts is {given!r}; it must be auto or like lfoot,rfoot:160+52"
         ) from None
     for name, first, count in runs:
         if first < 0 or count < 0 or not name or (not count and first):
-            raise OptionError(f"contacts: {count} frames of {name!r} from frame {first} on")
+            raise OptionError(
+                f"contacts: {name!r} cannot stand for {count} frames from frame {first} on"
+            )
     return runs
 
 
@@ -105,18 +107,20 @@ def runs_of(source: SignalSource, runs: Runs) -> tuple[Run, ...]:
     layout = source.layout
     skeleton, n_frames = skeleton_of(NAME, layout), layout.n_frames
     if not has_kinematics(skeleton, whole=True):
-        raise OptionError(f"contacts: skeleton {skeleton.name!r} has angles of an unknown unit")
+        raise OptionError(f"contacts: the angle unit of skeleton {skeleton.name!r} is unknown")
     if isinstance(runs, str):
         if not find_feet(skeleton):
             raise OptionError(
-                f"contacts: no joint of skeleton {skeleton.name!r} is a foot by its name; name "
-                "those that are, like contacts=ankle_l,ankle_r"
+                f"contacts: no joint of skeleton {skeleton.name!r} is named like a foot; name "
+                "the feet, such as contacts=ankle_l,ankle_r"
             )
         return _detect_runs(source, skeleton, None)
     for name, first, count in runs:
         _joint_index(skeleton, name)
         if first + count > n_frames:
-            raise OptionError(f"contacts: {name}:{first}+{count} goes beyond {n_frames} frames")
+            raise OptionError(
+                f"contacts: {name}:{first}+{count} ends after the last of {n_frames} frames"
+            )
     given = tuple(run for run in runs if run[2])
     alone = [name for name, _, count in runs if not count]
     return (*given, *_detect_runs(source, skeleton, alone)) if alone else given
@@ -148,7 +152,7 @@ def choose_contacts(
     if not by_joint:
         return None
     if len(by_joint) > MAX_POINTS:
-        raise OptionError(f"contacts: {len(by_joint)} joints, {MAX_POINTS} at most")
+        raise OptionError(f"contacts: {len(by_joint)} joints are more than {MAX_POINTS}")
     step = float(np.float32(SPREAD * tolerance))
     joints, points, pieces, n_stances = sorted(by_joint), [], [], 0
     for joint in joints:
@@ -184,5 +188,5 @@ def _group_joints(skeleton: Skeleton, joints: Sequence[int]) -> list[list[int]]:
 def _joint_index(skeleton: Skeleton, name: str) -> int:
     addresses = list(skeleton.addresses())
     if name not in addresses:
-        raise OptionError(f"contacts: there is no joint {name!r}")
+        raise OptionError(f"contacts: no joint is called {name!r}")
     return addresses.index(name)

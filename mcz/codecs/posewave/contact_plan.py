@@ -93,10 +93,12 @@ def parse_contacts(
     """Check the fields; raises FormatError where they do not fit the skeleton."""
     for record in fields:
         if not record.points:  # HOLD-03
-            raise FormatError(f"{where}: contacts of no point")
+            raise FormatError(f"{where}: contacts need at least one point")
         for number, point in enumerate(record.points):
             if point.follows > number:  # HOLD-06
-                raise FormatError(f"{where}: point {number + 1} follows point {point.follows}")
+                raise FormatError(
+                    f"{where}: point {number + 1} cannot follow point {point.follows}"
+                )
         return Contacts(
             rounds=record.rounds,
             ramp=record.ramp,
@@ -110,7 +112,9 @@ def parse_contacts(
 
 def _place(skeleton: Skeleton, joint: int, tail: int, where: str) -> tuple[float, float, float]:
     if joint >= skeleton.n_joints or tail > len(skeleton.joints[joint].tails):  # HOLD-05
-        raise FormatError(f"{where}: contacts of point {tail} of joint {joint}")
+        raise FormatError(
+            f"{where}: contacts refer to point {tail} of joint {joint}, which does not exist"
+        )
     if not tail:
         return 0.0, 0.0, 0.0
     x, y, z = (limit_number(x) for x in skeleton.joints[joint].tails[tail - 1])

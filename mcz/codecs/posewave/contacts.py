@@ -180,7 +180,7 @@ def decode_contacts(
             )
     coder.close()
     if not stream.is_whole:  # HOLD-07
-        raise FormatError(f"{where} do not take {len(stream.data)} bytes")
+        raise FormatError(f"{where} should not have {len(stream.data)} bytes")
     corrections.correct()
 
 
@@ -347,8 +347,8 @@ class ContactTracker:
             fault = corrections.code(coder, point, shifts[point], radii[point])
             if fault >= 0:
                 raise MotionError(
-                    f"contacts: from frame {self.first + fault} on a point moves or is off by more "
-                    "than 2^30 steps of its grid; give a greater contact_tolerance"
+                    f"contacts: from frame {self.first + fault} on a point moves or is off by "
+                    "more than 2^30 steps of its grid; use a larger contact_tolerance"
                 )
         return coder
 

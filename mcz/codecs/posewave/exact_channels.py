@@ -42,7 +42,7 @@ def joint_words(text: object) -> tuple[str, ...]:
     """
     words = text.split(",") if isinstance(text, str) else text
     if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
-        raise OptionError(f"{OPTION} is {text!r}, not names of joints")
+        raise OptionError(f"{OPTION} is {text!r}; it must be names of joints")
     names = tuple(word.strip() for word in words)
     if not all(names):
         raise OptionError(f"{OPTION} is {text!r}: a name is missing")
@@ -85,8 +85,8 @@ def cut_header(
         return header
     if not set(groups) <= set(fields.exact):
         raise OptionError(
-            f"{NAME}: joints that are not coded exactly cannot be cut out or left out; all of them "
-            f"are coded in one"
+            f"{NAME}: joints can be cut out or left out only if they are coded exactly; the "
+            "others are coded together"
         )
     left = {"plain": [], "orders": [], "exact": list(range(len(groups)))}
     start = fields.start % START_TABLES  # without a prior
@@ -128,7 +128,7 @@ def decode_exact(
     def rows(index: int, group: int) -> Ints:
         for resolution in range(1, layout.n_resolutions - request.resolution):
             if stream(index, resolution, group):  # PWAVE-35
-                raise FormatError(f"a detail of the exact group {group}", where=where)
+                raise FormatError(f"exact group {group} must not have details", where=where)
         data = stream(index, 0, group)
         return read_alone(shape(group), data, spans[index].n_frames)  # PWAVE-36
 

@@ -175,18 +175,21 @@ def parse_posewave_header(header: bytes, layout: Layout) -> Header:
     fields = parse(PosewaveHeader, header, f"{NAME} header")
     skeleton = layout.skeleton
     if skeleton is None:  # PWAVE-04
-        raise FormatError(f"{NAME}: a signal with channels of its own, not those of its skeleton")
+        raise FormatError(f"{NAME}: the signal must have the channels of its skeleton, not its own")
     many = len(layout.groups) > 1 and not fields.exact
     if layout.samples_per_frame != 1 or many:  # PWAVE-01, PWAVE-02
         raise FormatError(
-            f"{NAME}: {layout.samples_per_frame} samples a frame, {len(layout.groups)} groups"
+            f"{NAME}: {layout.samples_per_frame} samples a frame and {len(layout.groups)} "
+            "groups are not allowed"
         )
     if layout.n_resolutions > fields.levels + 1:  # PWAVE-16
-        raise FormatError(f"{NAME}: {layout.n_resolutions} resolutions, {fields.levels} levels")
+        raise FormatError(
+            f"{NAME}: {layout.n_resolutions} resolutions exceed {fields.levels} levels"
+        )
     number, start = divmod(fields.start, START_TABLES)
     last = len(start_tables()) - 1
     if start > last:  # PWAVE-07
-        raise FormatError(f"{NAME}: start table {start}, the last is {last}")
+        raise FormatError(f"{NAME}: start table {start} does not exist; the last is {last}")
     whole = bool(fields.flags & WHOLE_TURNS)
     turning = ANGLE_KINDS if whole else ROTATION_KINDS
     kinds = [channel.kind for channel in skeleton.channels]
@@ -196,11 +199,11 @@ def parse_posewave_header(header: bytes, layout: Layout) -> Header:
         ("weights", fields.weights, skeleton.n_joints),
     ):
         if len(codes) not in (0, due):  # PWAVE-13, PWAVE-14
-            raise FormatError(f"{NAME}: {len(codes)} of {name}, {due} are due")
+            raise FormatError(f"{NAME}: {len(codes)} codes of {name}; expected {due}")
     orders = joint_codes(fields.flags, fields.orders, skeleton)
     exact = _exact_mask(fields.exact, layout)
     if fields.exact and fields.contacts:  # PWAVE-39
-        raise FormatError(f"{NAME}: contacts and exact channels")
+        raise FormatError(f"{NAME}: contacts and exact channels exclude each other")
     plain = iter(fields.plain or [code_of(1.0)] * n_plain)
     rotation, position = ratio_of(fields.rotation), ratio_of(fields.position)
     greatest = np.array(
@@ -242,11 +245,11 @@ def _prior(number: int, n_channels: int) -> Prior | None:
     if not number:
         return None
     if number > len(priors()):  # PWAVE-41
-        raise FormatError(f"{NAME}: prior {number}, the last is {len(priors())}")
+        raise FormatError(f"{NAME}: prior {number} does not exist; the last is {len(priors())}")
     prior = priors()[number - 1]
     if len(prior.variances) != n_channels:  # PWAVE-42
         raise FormatError(
-            f"{NAME}: {n_channels} channels, prior {number} is of {len(prior.variances)}"
+            f"{NAME}: prior {number} is for {len(prior.variances)} channels, not {n_channels}"
         )
     return prior
 
@@ -258,7 +261,10 @@ def joint_codes(
     joints = [record.joint for record in records]
     ends = [-1, *joints, skeleton.n_joints]
     if any(after <= before for before, after in pairwise(ends)):  # PWAVE-15
-        raise FormatError(f"{NAME}: axis orders of joints {joints} of {skeleton.n_joints}")
+        raise FormatError(
+            f"{NAME}: axis orders of joints {joints} are not ascending, or beyond the "
+            f"{skeleton.n_joints} joints"
+        )
     codes = {record.joint: record.code for record in records}
     check_orders(codes, skeleton, NAME)
     if flags & VECTORS:
@@ -288,8 +294,10 @@ def _exact_mask(groups: Sequence[int], layout: Layout) -> Bools:
     exact, last = np.zeros(layout.n_channels, np.bool_), len(layout.groups) - 1
     for before, group in pairwise([-1, *groups]):
         if group <= before:  # PWAVE-32
-            raise FormatError(f"{NAME}: exact group {group} after {before}")
+            raise FormatError(
+                f"{NAME}: exact group {group} follows {before}, but groups must ascend"
+            )
         if group > last:  # PWAVE-33
-            raise FormatError(f"{NAME}: group {group} is exact, the last is {last}")
+            raise FormatError(f"{NAME}: exact group {group} does not exist; the last is {last}")
         exact[list(layout.groups[group])] = True
     return exact

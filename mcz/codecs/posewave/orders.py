@@ -88,7 +88,7 @@ def check_orders(codes: Mapping[int, int], skeleton: Skeleton, where: str) -> No
     """Raises FormatError for a joint that cannot have an order."""
     for index, code in codes.items():
         if own_sequence(skeleton.joints[index], skeleton) is None:  # PWAVE-23
-            raise FormatError(f"order {code} of joint {index}, whose axes have none", where=where)
+            raise FormatError(f"joint {index} cannot have axis order {code}", where=where)
 
 
 class Orders:
@@ -106,7 +106,9 @@ class Orders:
         coded, nothing = values.copy(), np.zeros((len(values), N_NOTES), np.int64)
         for place in self.places:
             if not (np.abs(values[:, place.columns]) < BEYOND).all():
-                raise MotionError("posewave: an angle of 2^40 or more in another order of axes")
+                raise MotionError(
+                    "posewave: an angle is 2^40 or more, too large for another axis order"
+                )
             if place.coded[0] == VECTOR:
                 angles = np.ascontiguousarray(values[:, place.columns])
                 kernels().follow_vectors(angles, place.own, self.full, self.rule)
@@ -178,11 +180,11 @@ def _read_notes(stream: bytes, notes: Ints, where: str) -> bytes:
         gap, at = read_varint(stream, at)
         number += 1 + gap
         if number >= len(flat):  # PWAVE-25
-            raise FormatError(f"a note {number} of {len(flat)}", where=where)
+            raise FormatError(f"note {number} does not exist; there are {len(flat)}", where=where)
         flat[number] = 1
         if number % N_NOTES:
             turns, at = read_varint(stream, at)
             if not 0 < turns < MAX_TURNS:  # PWAVE-26
-                raise FormatError(f"{turns} for turns", where=where)
+                raise FormatError(f"{turns} turns are out of range", where=where)
             flat[number] = (turns >> 1) ^ -(turns & 1)  # PWAVE-24
     return stream[at:]

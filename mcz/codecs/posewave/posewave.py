@@ -78,10 +78,15 @@ class LiveEncoder(contract.LiveEncoder):
     def __init__(self, layout: Layout, options: Params) -> None:
         self.skeleton = skeleton_of(NAME, layout)
         if options["levels"]:
-            raise OptionError(f"{NAME}: levels {options['levels']} needs frames that are to come")
+            raise OptionError(
+                f"{NAME}: levels={options['levels']} needs later frames, which a live stream "
+                "does not have; use levels=0"
+            )
         for name in NEEDS_ALL:
             if options[name] is not None:
-                raise OptionError(f"{NAME}: {name} needs all frames, and none is known yet")
+                raise OptionError(
+                    f"{NAME}: {name} needs all frames, which a live stream does not have"
+                )
         bound = PRESETS[options["preset"]] if options["step"] is None else None
         choice = live_choice(self.skeleton, options["step"], bound)
         self.header, self._weight = choice.header, choice.weights.approximations
@@ -114,7 +119,7 @@ class LiveEncoder(contract.LiveEncoder):
         return bool((np.sqrt((away * away).sum(axis=1)) <= self._bound).all())
 
     def change(self, options: Params) -> None:
-        raise OptionError(f"{NAME}: {', '.join(options)} cannot change while frames come")
+        raise OptionError(f"{NAME}: {', '.join(options)} cannot change within a stream")
 
 
 class LiveDecoder:
@@ -130,14 +135,14 @@ class LiveDecoder:
 
     def push(self, stream: bytes, fresh: bool) -> Floats:
         if self._broken and not fresh:  # PWAVE-31
-            raise LostFrameError(f"{NAME}: a frame needs the one before, which did not come")
+            raise LostFrameError(f"{NAME}: a frame needs the previous frame, which did not arrive")
         self._broken = True
         if self._fields.may_go_on:
             values: Floats = self._chain.decode(stream, 1, NAME, fresh=fresh)[0]
         elif fresh:
             values = decode_segment(self._fields, self._skeleton, [stream], 1, NAME)[0]
         else:  # PWAVE-28
-            raise FormatError(f"{NAME}: a frame that does not start fresh")
+            raise FormatError(f"{NAME}: a frame does not start fresh")
         self._broken = False
         return values
 
@@ -235,12 +240,12 @@ def decode(
     """
     fields = parse_posewave_header(header, layout)
     if fields.version > version:  # PWAVE-40
-        raise FormatError(f"{NAME}: whole turns in a signal of version {version}")
+        raise FormatError(f"{NAME}: whole turns are not allowed in version {version}")
     for span in spans:
         if span.lead or span.tail:  # PWAVE-03
-            raise FormatError(f"{NAME}: the segment at {span.first} bears upon others")
+            raise FormatError(f"{NAME}: the segment at {span.first} must not have a lead or tail")
         if not (span.fresh or fields.may_go_on):  # PWAVE-28
-            raise FormatError(f"{NAME}: the segment at {span.first} goes on from the one before")
+            raise FormatError(f"{NAME}: the segment at {span.first} must start fresh")
     if request.groups and set(request.groups) <= set(fields.exact_groups):
         return decode_exact(layout, spans, request, fetch, NAME)
     columns = [column for group in request.groups for column in layout.groups[group]]
@@ -255,7 +260,9 @@ def decode(
         stored = range(layout.n_resolutions - request.resolution)
         for group in set(lossy[1:]) & set(request.groups):
             if any(fetch(index, resolution, group) for resolution in stored):  # PWAVE-34
-                raise FormatError(f"{NAME}: segment at {span.first}: a stream of group {group}")
+                raise FormatError(
+                    f"{NAME}: segment at {span.first}: group {group} must not have a stream"
+                )
         values = decode_one([fetch(index, resolution, lossy[0]) for resolution in stored], span)
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
         if start < stop:
@@ -299,15 +306,17 @@ def joint_limits(text: object) -> tuple[tuple[str, float], ...]:
         match = _LIMIT.fullmatch(entry.strip())
         if match is None or match["unit"] not in UNIT_CM:
             units = ", ".join(UNIT_CM)
-            raise OptionError(f"quality is {entry!r}, not like feet=0.5mm; units are {units}")
+            raise OptionError(
+                f"quality has {entry!r}; write it like feet=0.5mm, with one of the units {units}"
+            )
         try:
             limit = float(match["number"]) * UNIT_CM[match["unit"]]
         except ValueError:
             raise OptionError(
-                f"quality is {entry!r}: {match['number']!r} is not a number"
+                f"quality has {entry!r}; {match['number']!r} is not a number"
             ) from None
         if not 0 < limit < 1e9:
-            raise OptionError(f"quality is {entry!r}: a limit must be more than 0")
+            raise OptionError(f"quality has {entry!r}; a limit must be above 0")
         limits.append((match["name"], limit))
     return tuple(limits)
 

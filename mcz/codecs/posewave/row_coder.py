@@ -72,7 +72,7 @@ def fresh_coder(start: Start) -> Ints:
 def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: str) -> None:
     """Code the mask ``kept`` of channels and the ``numbers`` of all, in place."""
     if _head().code_head(stream.coder, stream.data, N_SMALL, classes, kept, numbers):
-        raise FormatError("a first value of more than 40 bits", where=where)
+        raise FormatError("a first value exceeds 40 bits", where=where)
 
 
 class RowCoder:
@@ -142,12 +142,12 @@ class RowCoder:
         """All rows of the level, (n_rows, n_kept), in steps; ``ends``: the stream must end too."""
         if not self.n_kept:
             if not self.stream.is_whole:  # PWAVE-20, PWAVE-30
-                raise FormatError("bytes of rows, but no channel is kept", where=self.where)
+                raise FormatError("rows have bytes, but no channel is kept", where=self.where)
             return self._decoded(self._n_known, len(self._doubles))
         self._run(self._n_known, len(self._doubles), -1.0)
         if ends and not self.stream.is_whole:  # ROWS-01
             raise FormatError(
-                f"rows of kind {self.kind} do not take {len(self.stream.data)} bytes",
+                f"rows of kind {self.kind} should not have {len(self.stream.data)} bytes",
                 where=self.where,
             )
         return self._decoded(self._n_known, len(self._doubles))

@@ -137,7 +137,7 @@ def decode_segment(
     pyramid = Pyramid(n_frames, header.levels, header.borrowing)
     n_empty = header.levels - pyramid.n_details
     if any(streams[1 : 1 + n_empty]):  # PWAVE-17
-        raise FormatError(f"a stream of a level that {n_frames} frames have not", where=where)
+        raise FormatError(f"a level has a stream that {n_frames} frames do not need", where=where)
     orders = Orders(header.orders, skeleton)
     notes, coarsest = orders.read_notes(streams[0], n_frames, where)
     streams = [coarsest, *streams[1 + n_empty :]]
@@ -275,7 +275,7 @@ class SegmentChain:
 
     def _continued_state(self, where: str) -> tuple[LevelCoder, RowCoder]:
         if self._level_coder is None or self._rows is None:  # DATA-11
-            raise FormatError("continues a segment that is missing", where=where)
+            raise FormatError("the previous segment, which it continues, is missing", where=where)
         return self._level_coder, self._rows
 
     def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[LevelCoder, RowCoder]:

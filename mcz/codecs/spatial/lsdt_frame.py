@@ -142,7 +142,7 @@ def decode(
             coder.restart()
         elif not index or spans[index - 1].stop != span.first:
             raise FormatError(
-                f"{NAME}: the segment before {span.first}, which it needs, is missing"
+                f"{NAME}: the segment before frame {span.first} is needed, but missing"
             )
         stop = min(span.stop, request.stop)
         block = coder.decode(fetch(index, 0, 0), span.n_frames, stop - span.first)
@@ -156,7 +156,10 @@ def _header(header: bytes) -> FrameHeader:
     """The fields of FrameHeader; raises FormatError."""
     fields = parse(FrameHeader, header, f"{NAME} header")
     if fields.space.flags & (MEAN | COURSES):  # FRAME-05
-        raise FormatError(f"{NAME}: flags {fields.space.flags:#x}, it has no mean or courses")
+        raise FormatError(
+            f"{NAME}: flags {fields.space.flags:#x} announce a mean or courses, which it does "
+            "not have"
+        )
     return fields
 
 
@@ -270,7 +273,7 @@ class _LiveEncoder(LiveEncoder):
         chosen = preset_values(PRESETS, options)
         choice = space_choices.live_choice(NAME, layout, options["step"], options["basis"])
         if chosen["coder"] == "prefix":
-            raise OptionError(f"{NAME}: prefix codes need all frames, coder mixed does not")
+            raise OptionError(f"{NAME}: coder=prefix needs all frames; use coder=mixed")
         fields = FrameHeader(space=choice.fields, code=NO_CODES)
         self.header = build(fields, f"{NAME} header")
         self.models = choice.models
@@ -291,7 +294,7 @@ class _LiveEncoder(LiveEncoder):
         return stream, fresh
 
     def change(self, options: Params) -> None:
-        raise OptionError(f"{NAME}: {', '.join(options)} cannot change while frames come")
+        raise OptionError(f"{NAME}: {', '.join(options)} cannot change within a stream")
 
 
 class _LiveDecoder:
@@ -305,7 +308,7 @@ class _LiveDecoder:
         if fresh:
             self._coder.restart()
         elif self._broken:
-            raise LostFrameError(f"{NAME}: a frame needs the one before, which did not come")
+            raise LostFrameError(f"{NAME}: a frame needs the previous frame, which did not arrive")
         self._broken = True
         values: Floats = self._coder.decode(stream, 1, 1)[0]
         self._broken = False

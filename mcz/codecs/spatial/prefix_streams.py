@@ -124,7 +124,7 @@ def parse_vectors(
     fault = _kernels().code_vectors(coder, stream, rows, starts, codes.gaps, codes.values)
     used = int(coder[0])
     if fault >= 0 or used > 8 * len(data):  # BITS-02
-        raise FormatError(f"{where} has no code, or is out of range")
+        raise FormatError(f"{where} is not a valid code, or is out of range")
     # BITS-02, BITS-03
     if whole and (-(-used // 8) != len(data) or (used % 8 and data[-1] << used % 8 & 255)):
-        raise FormatError(f"{len(data)} bytes for {used} bits, or bits after the last", where=where)
+        raise FormatError(f"{len(data)} bytes do not match the {used} bits used", where=where)

@@ -153,7 +153,7 @@ def plan_of(
     n_frequencies = windows.window
     if windows.n_frames and len(windows.weights):
         if len(windows.weights) > MAX_POINTS * (3 if apart else 1):
-            raise MotionError(f"{name}: {len(windows.weights)} channels, at most {MAX_POINTS}")
+            raise MotionError(f"{name}: {len(windows.weights)} channels are more than {MAX_POINTS}")
         clip_fit = fit(windows, apart=apart, mean=mean, courses=courses)
         bases, n_frequencies = _bases(windows, clip_fit, asked)
         models = (build_model(bases),)

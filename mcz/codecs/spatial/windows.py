@@ -212,8 +212,8 @@ def space_of_windows(fields: WindowsHeader, layout: Layout) -> Space:
     count, n_cosines = space.courses.shape
     if count != fields.n_frequencies or n_cosines > fields.window:  # WIND-16
         raise FormatError(
-            f"{NAME}: {count} courses of {n_cosines} cosines for {fields.n_frequencies} "
-            f"coefficients and {fields.window} frames"
+            f"{NAME}: {count} courses of {n_cosines} cosines do not fit "
+            f"{fields.n_frequencies} coefficients and {fields.window} frames"
         )
     if count * n_cosines * fields.window > MAX_PRODUCTS:  # WIND-17
         raise FormatError(f"{NAME}: {count} courses of {fields.window} frames are too many")
@@ -337,7 +337,10 @@ def windows_of(stream: bytes, n_windows: int, where: str) -> Iterator[bytes]:
     for _ in range(n_windows):
         size, at = read_varint(stream, at)
         if size > len(stream) - at:  # WIND-07
-            raise FormatError(f"a window of {size} bytes at {at} of {len(stream)}", where=where)
+            raise FormatError(
+                (f"a window of {size} bytes at {at} exceeds the {len(stream)} bytes of the stream"),
+                where=where,
+            )
         yield stream[at : at + size]
         at += size
     if at != len(stream):  # WIND-07

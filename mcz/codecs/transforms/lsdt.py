@@ -109,7 +109,9 @@ def learn_bases(
     ``progress`` counts the iterations of all. Otherwise as ``learn_basis``.
     """
     if positions.ndim != 3:
-        raise OptionError(f"positions have shape {positions.shape}, not (frames, points, axes)")
+        raise OptionError(
+            f"positions have shape {positions.shape}; it must be (frames, points, axes)"
+        )
     n_axes = positions.shape[2]
     bases: list[Learned] = []
     while len(bases) < n_axes:
@@ -165,12 +167,12 @@ def start_basis(start: str | Floats, n_points: int) -> Floats:
     if not isinstance(start, str):
         matrix = np.ascontiguousarray(start, np.float64)
         if matrix.shape != (n_points, n_points):
-            raise OptionError(f"start has shape {matrix.shape}, not {n_points} x {n_points}")
+            raise OptionError(f"start has shape {matrix.shape}; expected {n_points} x {n_points}")
         if not np.abs(matrix @ matrix.T - np.eye(n_points)).max(initial=0.0) <= 1e-6:
             raise OptionError("start is not an orthogonal matrix")
         return matrix
     if start not in STARTS:
-        raise OptionError(f"start {start!r} is not one of {', '.join(STARTS)}")
+        raise OptionError(f"start is {start!r}; it must be one of {', '.join(STARTS)}")
     return STARTS[start](n_points)
 
 
@@ -196,15 +198,21 @@ STARTS: dict[str, Callable[[int], Floats]] = {"dct": dct_matrix, "haar": haar_ba
 
 def _check_options(sparsity: int, iterations: int, growth: int, n_points: int) -> None:
     if not 1 <= sparsity <= n_points:
-        raise OptionError(f"sparsity {sparsity} is not 1 to {n_points}, the number of points")
+        raise OptionError(
+            f"sparsity is {sparsity}; it must be 1 to {n_points}, the number of points"
+        )
     if iterations < 0 or growth < 0:
-        raise OptionError(f"iterations {iterations} and growth {growth} must not be negative")
+        raise OptionError(
+            f"iterations is {iterations} and growth {growth}; neither may be negative"
+        )
 
 
 def _checked_frames(frames: Floats) -> Floats:
     """``frames`` as float64 (N, J) in row order; raises OptionError for unusable ones."""
     if frames.ndim != 2 or not frames.size:
-        raise OptionError(f"frames have shape {frames.shape}; at least one of one point is needed")
+        raise OptionError(
+            f"frames have shape {frames.shape}; at least one frame of one point is needed"
+        )
     rows = np.ascontiguousarray(frames, np.float64)
     if not np.isfinite(rows).all():
         raise OptionError("a value of the training frames is not finite")

@@ -47,7 +47,9 @@ class PostFilter:
         """
         row = np.asarray(row, np.float64)
         if row.shape != self._rows.shape[1:]:
-            raise MotionError(f"a row of shape {row.shape}, the filter's is {self._rows.shape[1:]}")
+            raise MotionError(
+                f"the row has shape {row.shape}, but the filter needs {self._rows.shape[1:]}"
+            )
         if self._next == len(self._rows):
             self._rows[: 2 * DELAY] = self._rows[-2 * DELAY :]
             self._next = 2 * DELAY
@@ -97,7 +99,7 @@ def _filter_middle(rows: Floats, past: Floats, bank: Floats, low: float, high: f
 def _settings(rate: float, unit_cm: float) -> tuple[Floats, float, float]:
     """Taps as numbers, (13, 3), and both thresholds in length units."""
     if not (math.isfinite(unit_cm) and unit_cm > 0):
-        raise OptionError(f"post filter: a length unit of {unit_cm!r} cm")
+        raise OptionError(f"post filter: a length unit of {unit_cm!r} cm is not valid")
     bank = np.ascontiguousarray(filter_taps(rate).T / SCALE)
     low, high = (threshold / unit_cm for threshold in THRESHOLDS_CM)  # FILT-08
     return bank, low, high
@@ -111,7 +113,7 @@ def filter_taps(rate: float) -> Ints:
     25 taps of a filter sum to exactly 1. Raises OptionError for a rate that is not positive.
     """
     if not (math.isfinite(rate) and rate > 0):
-        raise OptionError(f"post filter: {rate!r} rows a second")
+        raise OptionError(f"post filter: {rate!r} rows a second are not a valid rate")
     taps = np.empty((len(CUTOFFS), DELAY + 1), np.int64)
     for row, cutoff in zip(taps, CUTOFFS, strict=True):
         side = _windowed_sinc(min(cutoff / rate, 0.5))

@@ -33,9 +33,9 @@ class Wavelet:
     def __post_init__(self) -> None:
         n_taps = len(self.lo)
         if n_taps != len(self.hi) or n_taps % 2 or not 2 <= n_taps <= MAX_TAPS:  # MRDWT-06
-            raise FormatError(f"wavelet: filters of {n_taps} and {len(self.hi)} taps")
+            raise FormatError(f"wavelet: the filters have {n_taps} and {len(self.hi)} taps")
         if not all(abs(tap) <= MAX_TAP for tap in (*self.lo, *self.hi)):  # MRDWT-07
-            raise FormatError(f"wavelet: a tap beyond {MAX_TAP}")
+            raise FormatError(f"wavelet: a tap exceeds {MAX_TAP}")
 
     @property
     def n_taps(self) -> int:
@@ -220,7 +220,7 @@ def by_name(name: str) -> tuple[int, Wavelet]:
     import pywt
 
     if name not in pywt.wavelist(kind="discrete"):
-        raise OptionError(f"wavelet {name!r} is unknown; registered are {', '.join(WAVELETS)}")
+        raise OptionError(f"wavelet {name!r} is unknown; the wavelets are {', '.join(WAVELETS)}")
     wavelet = pywt.Wavelet(name)
     try:
         return INLINE, Wavelet(tuple(wavelet.rec_lo), tuple(wavelet.rec_hi))

@@ -72,7 +72,7 @@ def parse_streams(
     for number in range(1, len(counts)):
         data = stream(number)
         if data and not known:  # MRDWT-19
-            raise FormatError(f"{coding.name}: details, but no step of the channel")
+            raise FormatError(f"{coding.name}: details are present, but the channel has no step")
         band = _parse_details(
             data, counts[number], prefixes[number], coarser, min(number, N_SETS - 1), coding
         )
@@ -154,16 +154,21 @@ def _parse_approximations(
     form, step, at = stream[0], 0, 1
     if coding.scaled:
         if len(stream) < 2:
-            raise FormatError(f"{coding.name}: the stream of an approximation ends before its step")
+            raise FormatError(
+                f"{coding.name}: the stream of an approximation is truncated before its step"
+            )
         step, at = stream[1], 2
     folded, at = read_varint(stream, at)
     first = (folded >> 1) ^ -(folded & 1)
     if abs(first) > MAX_INDEX:  # MRDWT-24
-        raise FormatError(f"{coding.name}: a first coefficient of {first}")
+        raise FormatError(f"{coding.name}: first coefficient {first} is out of range")
     halves, predictor = form & 63, form >> 6
     if halves == CONSTANT:
         if predictor or at != len(stream):  # MRDWT-21, MRDWT-22
-            raise FormatError(f"{coding.name}: form {form:#04x}, {len(stream) - at} bytes follow")
+            raise FormatError(
+                f"{coding.name}: form {form:#04x} does not fit the {len(stream) - at} bytes "
+                "that follow"
+            )
         return np.full(prefix, first, np.int64), step, True  # MRDWT-23
     band[:1] = first
     loops = _kernels()
@@ -255,5 +260,5 @@ def make_quantizer(
     unit = T_g / DEAD_ZONE if T_g > 0 else 1.0
     codes = tuple(code_of(float(weight)) for weight in weights)
     if decimals is None and (not T_g > 0 or unit < LEAST_UNIT):
-        raise OptionError(f"{name} is {T_g:g} and Q is not given, which leaves no quantizer step")
+        raise OptionError(f"with {name}={T_g:g} there is no quantizer step; give Q")
     return Quantizer(thresholds, decimals, unit, codes)

@@ -194,13 +194,15 @@ class _Decoder:
         fields = parse(WaveletHeader, header, f"{NAME} header")  # CODEC-05
         self.fields, self.layout, self.spans = fields, layout, spans
         if layout.samples_per_frame != 1:  # MRDWT-02
-            raise FormatError(f"{NAME}: {layout.samples_per_frame} samples a frame, it has 1")
+            raise FormatError(
+                f"{NAME}: the codec has 1 sample a frame, not {layout.samples_per_frame}"
+            )
         if layout.n_resolutions > fields.levels + 1:  # CUT-04, MRDWT-03
             raise FormatError(
-                f"{NAME}: {layout.n_resolutions} resolutions, but {fields.levels} levels"
+                f"{NAME}: {layout.n_resolutions} resolutions do not fit {fields.levels} levels"
             )
         if any(len(group) != 1 for group in layout.groups):  # MRDWT-01
-            raise FormatError(f"{NAME}: a group of more than one channel")
+            raise FormatError(f"{NAME}: a group has more than one channel")
         self.wavelet = (
             by_id(fields.wavelet)
             if fields.wavelet != INLINE
@@ -215,17 +217,17 @@ class _Decoder:
             # MRDWT-15, MRDWT-16, MRDWT-17
             if (span.lead, span.tail, span.fresh) != (min(span.first, lead), 0, True):
                 raise FormatError(
-                    f"{NAME}: the segment at {span.first} bears upon {span.lead} frames before and "
-                    f"{span.tail} after, not {min(span.first, lead)} and 0, or is not fresh"
+                    f"{NAME}: the segment at {span.first} has lead {span.lead} and tail "
+                    f"{span.tail}, not {min(span.first, lead)} and 0, or is not fresh"
                 )
         # MRDWT-05, MRDWT-12
         if any(span.first % unit for span in spans) or end > fields.coded_frames:
             raise FormatError(
-                f"{NAME}: segments of {unit} frames a coefficient, up to {end} of "
-                f"{fields.coded_frames}, do not fit"
+                f"{NAME}: segments up to frame {end} of {fields.coded_frames} do not fit "
+                f"coefficients of {unit} frames"
             )
         if end < fields.coded_frames and end % unit:  # MRDWT-13
-            raise FormatError(f"{NAME}: segments that end at {end}, inside a coefficient")
+            raise FormatError(f"{NAME}: the segments end at frame {end}, within a coefficient")
 
     def read(self, request: Request, fetch: Fetch) -> Floats:
         levels = self.fields.levels
@@ -258,7 +260,7 @@ class _Decoder:
         if due < band_ranges[0][1]:  # MRDWT-18
             raise FormatError(
                 f"{NAME}: frames {request.start}:{request.stop} need approximations up to "
-                f"{band_ranges[0][1]}, there are none from {due} on"
+                f"{band_ranges[0][1]}, but they end at {due}"
             )
         absent = np.zeros((0, len(request.groups)))
         bands += [absent] * (levels + 1 - n_bands)

@@ -53,7 +53,10 @@ class Shape:
         if not sound or not self.size:
             raise FormatError(f"recovery data: {self}")
         if run_length(self.n_recovery) + self.n_blocks > MOST_POINTS:
-            raise LimitError(f"recovery data: {self.n_blocks} and {self.n_recovery} blocks")
+            raise LimitError(
+                f"recovery data: {self.n_blocks} blocks and {self.n_recovery} recovery blocks "
+                "are too many"
+            )
 
     @property
     def size(self) -> int:

@@ -41,7 +41,7 @@ def from_c3d(reader: Reader, *, name: str = "motion") -> Motion:
         reader.write(stream)
         data = stream.getvalue()
     else:
-        raise OptionError(f"a {type(reader).__name__} is neither a c3d.Reader nor a c3d.Writer")
+        raise OptionError(f"{type(reader).__name__} is neither a c3d.Reader nor a c3d.Writer")
     motion: Motion = FORMATS["c3d"].read(data, name)
     return motion
 
@@ -88,7 +88,7 @@ def from_ezc3d(c3d: object, *, name: str = "motion") -> Motion:
     OptionError where ezc3d cannot write the file, and SourceError.
     """
     if not hasattr(c3d, "write"):
-        raise OptionError(f"a {type(c3d).__name__} is not an ezc3d.c3d; mcz.read reads files")
+        raise OptionError(f"{type(c3d).__name__} is not an ezc3d.c3d; to read a file, use mcz.read")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "motion.c3d")
         try:
@@ -129,8 +129,8 @@ def to_ezc3d(motion: Motion) -> c3d:
             there, values = array[chosen], signal.masked().T
             if there.size != values.size:
                 raise MotionError(
-                    f"of signal {signal.name!r} ezc3d reads {there.size} "
-                    f"numbers, and there are {values.size}",
+                    f"signal {signal.name!r} has {values.size} numbers, but ezc3d reads "
+                    f"{there.size}",
                     clip=motion.name,
                 )
             array[chosen] = values.reshape(there.shape)
@@ -147,7 +147,7 @@ def _arrays_by_role(data: c3d, motion: Motion) -> RoleArrays:
     places, samples = (data["data"]["points"][:3].transpose(1, 0, 2), data["data"]["analogs"][0])
     if len(places) != len(is_point):
         raise MotionError(
-            f"ezc3d has {len(places)} points, and the C3D {len(is_point)}", clip=motion.name
+            f"ezc3d has {len(places)} points, but the C3D has {len(is_point)}", clip=motion.name
         )
     return {
         "motion": (places, is_point),

@@ -89,11 +89,11 @@ def from_movement(
     its rate.
     """
     if not hasattr(dataset, "data_vars") or "position" not in dataset:
-        raise OptionError("no poses dataset of movement: it has no variable 'position'")
+        raise OptionError("not a poses dataset of movement: it has no variable 'position'")
     position = _ordered(dataset["position"], DIMS)
     space = [str(axis) for axis in position["space"].values]
     if space not in (["x", "y"], ["x", "y", "z"]):
-        raise OptionError(f"positions along {', '.join(space)}, not x, y or x, y, z")
+        raise OptionError(f"positions are along {', '.join(space)}, not x, y or x, y, z")
     places = position.values.transpose(0, 3, 2, 1)
     keypoints = [str(each) for each in position["keypoints"].values]
     individuals = [str(each) for each in position["individuals"].values]
@@ -146,7 +146,7 @@ def _ordered(array: DataArray, dims: tuple[str, ...]) -> DataArray:
     array = array.rename({old: new for old, new in SINGULAR.items() if old in array.dims})
     if set(array.dims) != set(dims):
         shown = ", ".join(map(str, array.dims))
-        raise OptionError(f"{array.name} along {shown}, not {', '.join(dims)}")
+        raise OptionError(f"{array.name} is along {shown}, not {', '.join(dims)}")
     for dim in dims:
         if dim not in array.coords:
             raise OptionError(f"{array.name} has no coordinates along {dim}")
@@ -173,14 +173,14 @@ def _frames(
     fps = dataset.attrs.get("fps")
     in_seconds = dataset.attrs.get("time_unit", "seconds" if fps else "frames") == "seconds"
     if fps is None and in_seconds:
-        raise OptionError("times in seconds without an attribute 'fps'")
+        raise OptionError("times are in seconds, but the attribute 'fps' is missing")
     counted = times if fps is None or not in_seconds else times * float(fps)
     numbers = np.rint(counted)
     if not (np.abs(counted - numbers) <= SLACK).all():
         counted = counted - counted[:1]
         numbers = np.rint(counted)
     if not (np.abs(counted - numbers) <= SLACK).all():
-        raise OptionError(f"times that are not at frames of {fps or 1} a second")
+        raise OptionError(f"times do not match {fps or 1} frames a second")
     counts = numbers.astype(np.int64) + 1
     rate = None if fps is None else frame_rate_of(fps, name)
     return rate, None if (counts == np.arange(1, len(counts) + 1)).all() else counts

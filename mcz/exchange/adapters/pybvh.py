@@ -38,7 +38,7 @@ def from_pybvh(bvh: Bvh, *, unit: str | None = None, up: str | None = None) -> M
     to "-z") state facts that it lacks. Raises OptionError for another one.
     """
     if not hasattr(bvh, "joint_angles"):
-        raise OptionError(f"a {type(bvh).__name__} is not a pybvh.Bvh; mcz.read reads files")
+        raise OptionError(f"{type(bvh).__name__} is not a pybvh.Bvh; to read a file, use mcz.read")
     nodes = [node for node in bvh.nodes if not node.is_end_site()]
     ends = [node for node in bvh.nodes if node.is_end_site()]
     numbers = {id(node): number for number, node in enumerate(nodes)}
@@ -113,7 +113,9 @@ class _Tree:
 
     def __init__(self, motion: Motion) -> None:
         if not np.isfinite(motion.values).all():
-            raise MotionError("pybvh has no gaps, and some values are none", clip=motion.name)
+            raise MotionError(
+                "some values are missing, which pybvh does not support", clip=motion.name
+            )
         skeleton = motion.skeleton
         in_degrees = replace(skeleton, angle_unit="deg")
         if skeleton.angle_unit == "rad" and len(motion.signals) == 1 and is_bvh(in_degrees):
@@ -125,7 +127,7 @@ class _Tree:
         self.values = np.asarray(self.motion.values, np.float64)
         self.starts = self.motion.skeleton.column_starts()
         if [joint.parent for joint in self.joints].count(-1) != 1:
-            raise MotionError("pybvh has one root, no more and no less", clip=motion.name)
+            raise MotionError("pybvh supports exactly one root", clip=motion.name)
         self.offsets = [self._offset(joint) for joint in range(len(self.joints))]
 
     def depth_first(self) -> Iterator[int]:
@@ -145,7 +147,7 @@ class _Tree:
         rest = [kind for kind in kinds if kind not in (*ROTATION_KINDS, *POSITION_KINDS)]
         if rest or len(set(own)) < len(own):
             raise MotionError(
-                f"joint {self.names[joint]!r}: pybvh has no channels {' '.join(kinds)}"
+                f"joint {self.names[joint]!r}: pybvh does not support channels {' '.join(kinds)}"
             )
         angles = np.zeros((len(self.values), 3))
         columns = [self.starts[joint] + kinds.index(kind) for kind in own]
@@ -178,7 +180,7 @@ class _Tree:
         places = self._places(joint)
         if (places != places[:1]).any():
             raise MotionError(
-                f"joint {self.names[joint]!r} changes its place on its parent; in pybvh only the "
-                "root can"
+                f"joint {self.names[joint]!r} moves relative to its parent, which pybvh "
+                "supports only for the root"
             )
         return places[0] if len(places) else np.array(self.joints[joint].offset)

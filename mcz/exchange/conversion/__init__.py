@@ -62,7 +62,7 @@ def to_c3d(motion: Motion) -> Motion:
     with np.errstate(over="ignore"):
         values = np.asarray(made.signals[0].values, np.float64) * (unit_cm * MM_PER_CM)
     if np.isinf(values).any():
-        raise MotionError("a position in mm is beyond float64", clip=motion.name)
+        raise MotionError("a position in mm exceeds float64", clip=motion.name)
     signal = replace(made.signals[0], values=values)
     return replace(
         made,
@@ -104,13 +104,13 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     """
     if to not in TARGETS:
         scene = "; mcz.to_glb writes scenes" if to in ("glb", "gltf") else ""
-        raise OptionError(f"no conversion to {to!r}, but to {', '.join(TARGETS)}{scene}")
+        raise OptionError(f"cannot convert to {to!r}; the formats are {', '.join(TARGETS)}{scene}")
     motion = SourceOptions(rate=rate).applied_to(motion)
     same = to == "c3d" and point_set(motion.skeleton) == "markers"
     same = same or (FORMATS[to].is_table and not needs_rate(motion, to))
     if to != "amc" and not same and motion.frame_rate is None:
         raise OptionError(
-            f"its frame rate is unknown, and {to.upper()} states one",
+            f"its frame rate is unknown, but {to.upper()} must state one",
             clip=motion.name,
             hint=Hint.RATE,
         )

@@ -127,13 +127,13 @@ def _check(motion: Motion) -> None:
     if not motion.signals[0].has_poses:
         raise MotionError("BVH can hold only the channels of a skeleton", clip=motion.name)
     if gap := first_gap(motion):
-        raise MotionError(f"BVH cannot leave out values, but {gap}", clip=motion.name)
+        raise MotionError(f"BVH cannot omit values, but {gap}", clip=motion.name)
     if is_bvh(motion.skeleton):
         return
     for joint in motion.skeleton.joints:
         if any(not channel.kind for channel in joint.channels):
             raise MotionError(
-                f"joint {joint.name!r} has plain scalars, of which is not known how they move it"
+                f"joint {joint.name!r} has plain scalars, and how they move it is unknown"
             )
 
 
@@ -234,13 +234,15 @@ def _check_acclaim(motion: Motion) -> None:
         raise MotionError("markers have no skeleton, and AMC needs one", clip=motion.name)
     roots = [joint.name for joint in skeleton.joints if joint.parent < 0]
     if len(roots) != 1:
-        raise MotionError(f"ASF has one root, and the skeleton has {len(roots)}: {roots[:8]}")
+        raise MotionError(f"ASF has one root, but the skeleton has {len(roots)}: {roots[:8]}")
     if not motion.signals[0].has_poses:
         raise MotionError("AMC can hold only the channels of a skeleton", clip=motion.name)
     for joint in skeleton.joints:
         for channel in joint.channels:
             if channel.kind not in POSITION_KINDS + ROTATION_KINDS:
-                raise MotionError(f"ASF has no channel {channel.label!r}, as joint {joint.name!r}")
+                raise MotionError(
+                    f"ASF cannot hold channel {channel.label!r} of joint {joint.name!r}"
+                )
 
 
 class _Bones:
@@ -321,8 +323,8 @@ class _Bones:
                 track = self.motion.values[:, column]
                 if len(track) and not (track == track[0]).all():
                     raise MotionError(
-                        f"joint {joint.name!r} has position channels that change, and bones of "
-                        "ASF keep their place on their parent"
+                        f"joint {joint.name!r} moves relative to its parent, which ASF cannot "
+                        "express"
                     )
                 offset[POSITION_KINDS.index(channel.kind)] += float(track[0]) if len(track) else 0.0
         x, y, z = offset

@@ -72,8 +72,8 @@ def _check_sizes(motion: Motion) -> None:
         frame = row // motion.signals[0].samples_per_frame
         name = motion.skeleton.addresses()[column // 3]
         raise MotionError(
-            f"frame {frame}, {name} is at {values[row, column]:g}, too far "
-            "off for inverse kinematics",
+            f"frame {frame}, {name}: {values[row, column]:g} is too far away for inverse "
+            "kinematics",
             clip=motion.name,
         )
 
@@ -98,18 +98,20 @@ def from_positions(motion: Motion, base: Skeleton) -> Solved:
     skeleton, first = motion.skeleton, motion.signals[0]
     if point_set(skeleton) != "markers":
         raise MotionError(
-            f"motion {motion.name!r} has joints that are no markers, so it has no positions to fit"
+            f"motion {motion.name!r} has joints that are not markers, so there are no "
+            "positions to fit"
         )
     _check_sizes(motion)
     if point_set(base) == "markers":
         raise MotionError(
-            f"the skeleton to fit, {base.name!r}, has markers alone", clip=motion.name
+            f"skeleton {base.name!r} has only markers, so it cannot be fitted", clip=motion.name
         )
     n_points, n_markers = len(point_names(base)), 3 * base.n_joints
     if skeleton.n_joints not in (n_points, n_points + n_markers):
         raise MotionError(
-            f"motion {motion.name!r} has {skeleton.n_joints} markers, and skeleton {base.name!r} "
-            f"has {n_points} points, or {n_points + n_markers} with its virtual markers"
+            f"motion {motion.name!r} has {skeleton.n_joints} markers, but skeleton "
+            f"{base.name!r} has {n_points} points, or {n_points + n_markers} with its virtual "
+            "markers"
         )
     seen_at = positions(motion)
     if skeleton.unit_cm and base.unit_cm:

@@ -36,7 +36,9 @@ def to_size(text: int | str) -> int:
         size = Decimal(number) * UNITS[unit]
         if 0 <= size < 2**62:
             return int(size)
-    raise OptionError(f"a cache of {text!r}: bytes, or a text such as '64 MB'")
+    raise OptionError(
+        f"cache is {text!r}; it must be a number of bytes, or a string such as '64 MB'"
+    )
 
 
 def size_of(arrays: Arrays) -> int:

@@ -39,7 +39,7 @@ def chosen_fields(names: str | Iterable[str]) -> tuple[Field, ...]:
     """The fields of these names, a list or a text with commas; raises OptionError."""
     listed = [n.strip() for n in names.split(",")] if isinstance(names, str) else list(names)
     if not listed or len(set(listed)) != len(listed) or not all(listed):
-        raise OptionError(f"fields {names!r}: each once, and at least one")
+        raise OptionError(f"fields is {names!r}; name at least one field, and none twice")
     return tuple(field_called(str(name)) for name in listed)
 
 
@@ -111,9 +111,7 @@ def _contacts(subject: Subject, rows: Rows) -> Floats:
 
 def _up_column(skeleton: Skeleton) -> int:
     if not skeleton.up_axis:
-        raise OptionError(
-            f"skeleton {skeleton.name!r}: the axis that points up is unknown", hint=Hint.UP
-        )
+        raise OptionError(f"the up axis of skeleton {skeleton.name!r} is unknown", hint=Hint.UP)
     return column_of(skeleton.up_axis)
 
 
@@ -187,8 +185,8 @@ def _humanml3d_joints(subject: Subject) -> tuple[int, ...]:
     names = tuple(subject.skeleton.joints[joint].name for joint in subject.joints)
     if len(names) != len(JOINTS) and names[: len(JOINTS)] != JOINTS:
         raise OptionError(
-            f"humanml3d: {len(names)} joints, but it needs {len(JOINTS)} (joints=), in the order "
-            f"{', '.join(JOINTS)}"
+            f"humanml3d: {len(names)} joints are given; choose {len(JOINTS)} with joints=, in "
+            f"the order {', '.join(JOINTS)}"
         )
     return subject.joints[: len(JOINTS)]
 

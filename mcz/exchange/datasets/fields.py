@@ -66,7 +66,7 @@ class Subject:
         """The chosen joints that are parts of feet by name; raises OptionError without any."""
         feet = tuple(joint for joint in find_feet(self.skeleton) if joint in self.joints)
         if not feet:
-            raise OptionError("no chosen joint is a foot by its name")
+            raise OptionError("no chosen joint is named like a foot")
         return feet
 
     @cached_property
@@ -160,6 +160,6 @@ def features_of(
             arrays[each.name] = np.ascontiguousarray(part, dtype)
         if np.isinf(arrays[each.name]).any() and not np.isinf(part).any():
             raise MotionError(
-                f"{each.name}: a value is beyond {np.dtype(dtype)}; give another dtype"
+                f"{each.name}: a value is too large for {np.dtype(dtype)}; choose another dtype"
             )
     return arrays

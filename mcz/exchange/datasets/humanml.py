@@ -70,7 +70,9 @@ def humanml3d_positions(features: ArrayLike) -> Floats:
     """
     rows = np.asarray(features, np.float64)
     if rows.ndim != 2 or rows.shape[1] != N_FEATURES:
-        raise MotionError(f"features {rows.shape}: ({N_FEATURES} numbers a frame)")
+        raise MotionError(
+            f"features have shape {rows.shape}; expected {N_FEATURES} numbers a frame"
+        )
     headings = np.zeros(len(rows))
     headings[1:] = 2 * np.cumsum(rows[:-1, 0])
     roots = np.zeros((len(rows), 3))
@@ -85,7 +87,10 @@ def humanml3d_positions(features: ArrayLike) -> Floats:
 def _check_positions(positions: ArrayLike) -> Floats:
     places = np.array(positions, np.float64)
     if places.ndim != 3 or places.shape[1:] != (len(JOINTS), 3) or len(places) < 2:
-        raise MotionError(f"positions {places.shape}: (2 frames or more, {len(JOINTS)} joints, 3)")
+        raise MotionError(
+            f"positions have shape {places.shape}; expected (at least 2 frames, {len(JOINTS)} "
+            "joints, 3)"
+        )
     return places
 
 
@@ -182,7 +187,9 @@ def _shortest_turn(start: Floats, ends: Floats) -> Floats:
 def _with_lengths(places: Floats, lengths: Floats) -> Floats:
     """The same with bones of these lengths in their directions."""
     if lengths.shape != (len(JOINTS),) or not (lengths[1:] > 0).all():
-        raise OptionError(f"bone_lengths: {len(JOINTS)} lengths above 0, but for the root's")
+        raise OptionError(
+            f"bone_lengths must be {len(JOINTS)} lengths, all above 0 except that of the root"
+        )
     bones = places - places[:, [max(0, parent) for parent in PARENTS]]
     own = np.linalg.norm(bones, axis=-1, keepdims=True)
     leg = [5, 8]

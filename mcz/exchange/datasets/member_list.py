@@ -116,7 +116,7 @@ def _recipe(
 ) -> Recipe:
     kind = np.dtype(dtype)
     if kind not in (np.float16, np.float32, np.float64):
-        raise OptionError(f"dtype {kind}: float16, float32 or float64")
+        raise OptionError(f"dtype is {kind}; it must be float16, float32 or float64")
     exact = None if rate is None else frame_rate_of(rate, "rate")
     names = joints if joints is None or isinstance(joints, (str, int)) else tuple(joints)
     return recipe_of(fields, exact, names, units, kind)
@@ -124,9 +124,9 @@ def _recipe(
 
 def _cut(window: int | None, stride: int | None) -> tuple[int | None, int]:
     if window is not None and window < 1:
-        raise OptionError(f"window of {window} frames")
+        raise OptionError(f"window is {window} frames; it must be at least 1")
     if stride is not None and (stride < 1 or window is None):
-        raise OptionError(f"stride of {stride} frames, of windows of {window}")
+        raise OptionError(f"stride is {stride} frames, which does not fit windows of {window}")
     return window, stride or window or 1
 
 
@@ -144,10 +144,14 @@ def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterato
         if Path(path).is_dir():
             paths = sorted(str(found) for found in Path(path).rglob("*.mcz"))
             if not paths:
-                raise OptionError("a folder without .mcz files (mcz pack makes one)", path=path)
+                raise OptionError(
+                    "the folder contains no .mcz file; make one with mcz pack", path=path
+                )
         for name in paths:
             if is_source(name):
-                raise OptionError(f"{name}: a data set is made of .mcz files; mcz pack makes one")
+                raise OptionError(
+                    f"{name}: a data set reads only .mcz files; make one with mcz pack"
+                )
             yield open(name, threads=1), name
 
 
@@ -186,7 +190,7 @@ def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> 
         return len(frames)
     if member.source_rate is None:
         raise OptionError(
-            "its frame rate is unknown; set source_rate=",
+            "its frame rate is unknown; set it with source_rate=",
             path=member.target,
             clip=member.clip,
         )

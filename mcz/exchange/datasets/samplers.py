@@ -97,7 +97,7 @@ def label_of(member: Member, clip: Clip, by: str, pattern: str | None) -> str:
             raise OptionError(f"pattern {pattern!r}: {error}") from None
         if found is None or not found.groups() or found[1] is None:
             raise OptionError(
-                f"pattern {pattern!r} has no group that its name matches",
+                f"pattern {pattern!r} captures no group in its name",
                 path=member.target,
                 clip=member.clip,
             )
@@ -106,8 +106,8 @@ def label_of(member: Member, clip: Clip, by: str, pattern: str | None) -> str:
         return member.label
     if by not in clip.metadata:
         raise OptionError(
-            f"its metadata say no {by!r}; give a pattern over names, such as "
-            "pattern=r'^(\\d+)_', or by='clip'",
+            f"its metadata have no {by!r}; extract it from clip names, such as "
+            "pattern=r'^(\\d+)_', or use by='clip'",
             path=member.target,
             clip=member.clip,
         )
@@ -121,12 +121,14 @@ def split(
     shares = list(parts.values())
     positive = all(isinstance(s, (int, float)) and 0 < s <= 1 for s in shares)
     if not shares or not positive or not math.isclose(sum(shares), 1):
-        raise OptionError(f"parts {dict(parts)}: shares above 0 that add up to 1")
+        raise OptionError(f"parts is {dict(parts)}; the shares must be above 0 and add up to 1")
     totals: dict[str, int] = {}
     for label, weight in zip(labels, weights, strict=True):
         totals[label] = totals.get(label, 0) + weight
     if len(totals) < len(parts):
-        raise OptionError(f"{len(totals)} subjects or the like for {len(parts)} parts")
+        raise OptionError(
+            f"{len(totals)} subjects (or other groups) cannot fill {len(parts)} parts"
+        )
     names, whole = list(parts), sum(weights)
     shuffled = sorted(totals)
     np.random.default_rng(SEED(seed)).shuffle(shuffled)

@@ -25,7 +25,7 @@ def subject_of(
         skeleton = facing(skeleton, units.up)
     timed = [each.name for each in fields if each.reach]
     if timed and not is_timed:
-        raise OptionError(f"{', '.join(timed)}: a frame rate is needed (source_rate=)")
+        raise OptionError(f"{', '.join(timed)}: a frame rate is needed; set it with source_rate=")
     lengths = any(each.lengths for each in fields)
     subject = Subject(
         skeleton,

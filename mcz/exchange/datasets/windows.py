@@ -131,7 +131,7 @@ class Dataset:
 
     def _first_subject(self) -> Subject:
         if not self.members:
-            raise OptionError("a data set of no clips")
+            raise OptionError("a data set needs at least one clip")
         member = self.members[0]
         return self._settings.recipe.subject(self._blocks.sources.clip(member), member)
 
@@ -139,7 +139,7 @@ class Dataset:
         """Clip and frames of window ``index``; raises OutOfRangeError, which is an IndexError."""
         number = row_numbers(index, len(self), "window")
         if not isinstance(number, int):
-            raise OutOfRangeError(f"{index!r} is not the number of a window")
+            raise OutOfRangeError(f"{index!r} is not a valid window number")
         member, start, stop = self._place(number)
         first = ceil(member.first / self._settings.recipe.step(member))
         time = self._blocks.sources.time(self._settings.recipe, member, start)
@@ -161,11 +161,11 @@ class Dataset:
         two dimensions gives (n, m, window, ...). Raises OutOfRangeError, which is an IndexError.
         """
         if isinstance(index, str):
-            raise OutOfRangeError(f"windows come before fields: data[:8][{index!r}]")
+            raise OutOfRangeError(f"select windows before fields: data[:8][{index!r}]")
         if isinstance(index, tuple) and len(index) < 2:
             index = index[0] if index else ...
         if isinstance(index, tuple):
-            raise OutOfRangeError(f"a data set has one axis, its windows, and no index {index!r}")
+            raise OutOfRangeError(f"a data set has one axis, its windows; {index!r} has more")
         chosen = row_numbers(index, len(self), "window")
         if isinstance(chosen, int):
             return self._arrays(*self._place(chosen))
@@ -178,7 +178,9 @@ class Dataset:
 
     def _batch(self, numbers: Sequence[int]) -> dict[str, Reals]:
         if self._settings.window is None:
-            raise OptionError("whole clips differ in length and make no batch; give a window=")
+            raise OptionError(
+                "whole clips differ in length, so they cannot be batched; set window="
+            )
         shape = len(numbers), self._settings.window
         if not numbers:
             dtype = self._settings.recipe.dtype
@@ -228,7 +230,7 @@ class Dataset:
         scales = dict(self.statistics() if statistics is None else statistics)
         missing = [name for name in self.fields if name not in scales]
         if missing:
-            raise OptionError(f"statistics of no {', '.join(missing)}")
+            raise OptionError(f"the statistics lack {', '.join(missing)}")
         normalized = self.part(self.members)
         normalized.skipped, normalized._scales = self.skipped, scales
         return normalized

@@ -95,7 +95,7 @@ def _check_not_replaced(stream: BinaryIO, path: Path) -> None:
     except OSError:
         same = False
     if not same:
-        raise AccessError("it was replaced by another file while its addition was coded", path=path)
+        raise AccessError("another file replaced it while the addition was encoded", path=path)
 
 
 def _write_at(stream: BinaryIO, end: int, added: BinaryIO) -> None:
@@ -142,8 +142,9 @@ def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tup
             raise reason
         if names:
             raise FormatError(
-                f"its writing was cut short; after the last FOOT, which ends at {foot}, these "
-                f"are whole: {', '.join(sorted(names))}; salvage keeps them, force drops them"
+                "an earlier write was interrupted; these clips are complete after the last "
+                f"FOOT, which ends at {foot}: {', '.join(sorted(names))}; salvage keeps them, "
+                "force drops them"
             )
         return shorter, Tail()
     if longer is not None and salvage:

@@ -62,7 +62,7 @@ class ChunkCopier:
             raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
         payload = self.container.payload(chunk)
         if chunk_id(kind, payload, self.container.profile) != id_:
-            raise ChecksumError(f"its id is not {id_.hex()}", where=f"chunk {chunk.label}")
+            raise ChecksumError(f"its id should be {id_.hex()}", where=f"chunk {chunk.label}")
         return payload
 
     def shared(self, kind: bytes, id_: bytes) -> None:
@@ -126,7 +126,9 @@ class ChunkCopier:
         payload = self.container.payload(row.clip)
         head = parse_until(payloads.Clip, payload, row.clip.label, "signals")
         if head.name != name or head.skeleton != row.skeleton:
-            raise FormatError(f"{row.clip.label}: clip {head.name!r}, in the index {name!r}")
+            raise FormatError(
+                f"{row.clip.label} is clip {head.name!r}, but the index says {name!r}"
+            )
         if head.source is not None:
             self.shared(ChunkType.SRCE, head.source.template)
         self.skeleton(row.skeleton)
@@ -152,7 +154,7 @@ class ChunkCopier:
         for chunk in row.ancillary:
             data = read_chunk(self.container.source, chunk.offset)
             if data.type != chunk.type:
-                raise FormatError(f"{data.label} is {chunk.label} in the index")
+                raise FormatError(f"{data.label} is {chunk.label} according to the index")
             if data.type != but:
                 self.ancillary(data)
 
@@ -170,7 +172,7 @@ class ChunkCopier:
         for chunk, at in takewhile(lambda one: one[0].offset < stop, inner_chunks):
             yield chunk, at
         if at != row.cend.offset:
-            raise FormatError(f"{row.cend.label} is not at its place in the index", clip=row.name)
+            raise FormatError(f"{row.cend.label} is not where the index says", clip=row.name)
 
     def _copy_body(self, row: ClipRow, new: PackedClipRow) -> None:
         """Copy the chunks after CLIP up to CEND; ``new`` records their places."""

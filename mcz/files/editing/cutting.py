@@ -108,12 +108,12 @@ def plan_cut(
     start, stop = frames if frames is not None else (0, None)
     stop = clip.n_frames if stop is None else stop
     if not 0 <= start <= stop <= clip.n_frames:
-        raise OptionError(f"clip {clip.name!r} has frames 0 to {clip.n_frames}, not {start}:{stop}")
+        raise OptionError(f"clip {clip.name!r} has {clip.n_frames} frames, not {start}:{stop}")
     motion = clip.signals[0]
     if not 0 <= resolution < motion.counts.n_resolutions:
         raise OptionError(
-            f"the {resolution} finest resolutions cannot be cut, "
-            f"it has {motion.counts.n_resolutions}",
+            f"cannot leave out the {resolution} finest resolutions: it has "
+            f"{motion.counts.n_resolutions}",
             clip=clip.name,
         )
     kept = None if joints is None else _find_joints(clip, joints)
@@ -124,7 +124,7 @@ def plan_cut(
         if mixed is not None and is_recoded:
             return replace(cut, is_recoded=True)
         if mixed is not None:
-            raise coded_together(clip, *mixed, "cut out, its channels are coded")
+            raise coded_together(clip, *mixed, "cut out: its channels are coded")
     signals = list(map(partial(_plan_signal, cut), clip.signals, groups))
     if is_recoded and any(part.skip or part.spare for part in signals):
         return replace(cut, is_recoded=True)
@@ -135,7 +135,7 @@ def _find_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
     """The joints as indices, None if no joint with channels is left out."""
     skeleton = clip.skeleton
     if not clip.signals[0].has_poses:
-        raise OptionError("its motion has channels of its own, no joints", clip=clip.name)
+        raise OptionError("its motion signal is not made of joints", clip=clip.name)
     with error_context(clip=clip.name):
         kept = frozenset(skeleton.find(joint) for joint in joint_list(joints))
     others = (joint for index, joint in enumerate(skeleton.joints) if index not in kept)
@@ -165,7 +165,7 @@ def coded_together(clip: Clip, joint: int, other: int, text: str) -> OptionError
     """The error for a joint that shares a group with another, and the way out."""
     names, codec = clip.skeleton.addresses(), clip.signals[0].codec
     return OptionError(
-        f"joint {names[joint]} cannot be {text} in one group with those of {names[other]}",
+        f"joint {names[joint]} cannot be {text} together with those of {names[other]}",
         clip=clip.name,
         hint=Hint.RECODE if codec.lossless else Hint.RECODE_LOSSY,
     )

@@ -124,13 +124,13 @@ def extract(
     """
     alone = clip is not None or where is not None
     if not resolution and joints is None and frames is None and not alone:
-        raise OptionError("nothing to extract: give a resolution, joints, frames or a clip")
+        raise OptionError("nothing to extract: give a resolution, joints, frames or clips")
     with open(source, salvage=salvage, max_decoded=max_decoded) as opened:
         file = File(opened.container.strictly())
         names = [clip] if isinstance(clip, str) else clip
         clips = file.chosen(names, where)
         if not clips:
-            raise OptionError("it has no clip to extract from", path=file.name)
+            raise OptionError("the file has no clip", path=file.name)
         cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
         for cut in cuts:
             if cut.is_recoded:
@@ -300,7 +300,7 @@ class Copier(ChunkCopier):
             hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
             if motion.source is None:  # a damaged file; the template may give the reason
                 self.container.template(source.template, source.format)
-                raise FormatError("it cannot be put together")
+                raise FormatError("the parts cannot be combined")
             return self.put_source(cut, new, motion), hashes
         return b"", [self._value_hash(cut, part) for part in cut.signals]
 

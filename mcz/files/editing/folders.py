@@ -338,7 +338,7 @@ def _relative(path: Path, root: str | os.PathLike[str]) -> str:
     try:
         return path.resolve().relative_to(Path(root).resolve()).as_posix()
     except ValueError:
-        raise OptionError(f"it does not lie below {root}", path=path) from None
+        raise OptionError(f"the file is not below {root}", path=path) from None
 
 
 SECOND = 10**9

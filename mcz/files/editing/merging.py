@@ -63,7 +63,7 @@ def merge(
     greatest redundancy of them; if only some have, the report mentions it.
     """
     if not sources:
-        raise OptionError("nothing to merge: name MCZ files")
+        raise OptionError("nothing to merge: give at least one MCZ file")
     merging = Merger(rename, skip_identical)
     with (
         merging.plans(sources) as plans,
@@ -140,8 +140,8 @@ class Merger:
             pairs = [(file, self._plan_file(file, double)) for file in files]
             if double:
                 raise OptionError(
-                    f"{list_some(double)}: {counted(len(double), 'name')} in more than one file; "
-                    "rename the later ones, or skip those of identical content"
+                    f"{list_some(double)}: {counted(len(double), 'name')} in more than one "
+                    "file; rename the later ones, or skip identical content"
                 )
             yield pairs
 

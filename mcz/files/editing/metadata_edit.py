@@ -105,7 +105,7 @@ def _respell(entries: Entries) -> Entries:
     respelled = {registered_key(key): value for key, value in entries.items()}
     if len(respelled) < len(entries):
         twice = next(key for key in SPELLINGS if key in entries)
-        raise OptionError(f"{twice!r} and {SPELLINGS[twice]!r} are one key")
+        raise OptionError(f"{twice!r} and {SPELLINGS[twice]!r} are the same key")
     return respelled
 
 
@@ -137,7 +137,7 @@ def set_rate(
     """
     exact = frame_rate_of(rate, "rate").limit_denominator(10**6)
     if exact <= 0:
-        raise OptionError(f"rate is {rate}, not above 0")
+        raise OptionError(f"rate is {rate}; it must be above 0")
     with rewriting(target, output, force=force) as job:
         file = job.file
         named = names is not None or where is not None
@@ -158,12 +158,14 @@ def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
     if states_rate(clip):
         stated = ", ".join(sorted(name for name, known in FORMATS.items() if known.states_rate))
         raise OptionError(
-            f"its source states the rate, as {stated} do; encode it again", clip=clip.name
+            f"its source format states the frame rate (as do {stated}), so the rate cannot be "
+            "changed here; encode the source again",
+            clip=clip.name,
         )
     if clip.frame_rate not in (None, rate) and not force:
         raise OptionError(
-            f"clip {shown(clip.name)} has {float(clip.frame_rate or 0):g} frames a second; "
-            "force changes that"
+            f"clip {shown(clip.name)} already has {float(clip.frame_rate or 0):g} frames a "
+            "second; use force to change it"
         )
 
 
@@ -175,7 +177,7 @@ def _check_sources(target: Target, names: Iterable[str]) -> None:
         for name in list(names)[:1]:
             clip = file.clips[name]
             if clip.source is not None and len(clip.source_bytes()) != clip.source.size:
-                raise ChecksumError("its source is not restored", clip=name)
+                raise ChecksumError("its source can no longer be restored", clip=name)
 
 
 NAMES = ("clip", "name", "path", "file")  # columns that may name the clip, in order of preference
@@ -212,8 +214,9 @@ def from_table(
         clip_names = known.get(name, ())
         if len(clip_names) > 1:
             raise OptionError(
-                f"row {number}: {name!r} may be {list_some(sorted(clip_names))}; write one of "
-                "these, or make it of more columns with match, such as {folder}/{trial}",
+                f"row {number}: {name!r} is ambiguous: {list_some(sorted(clip_names))}; write "
+                "one of these names, or build it from more columns with match, such as "
+                f"{{folder}}/{{trial}}",
                 path=path,
             )
         if not clip_names:
@@ -221,12 +224,12 @@ def from_table(
             continue
         clip = next(iter(clip_names))
         if clip in entries_by_clip:
-            raise OptionError(f"two rows are about clip {clip!r}", path=path)
+            raise OptionError(f"two rows match clip {clip!r}", path=path)
         cells = {key: row[column].strip() for key, column in columns.items()}
         entries_by_clip[clip] = {key: text for key, text in cells.items() if text}
     if unknown and not skip_unknown:
         raise OptionError(
-            f"no clip for {len(unknown)} of {len(rows)} rows: {list_some(unknown)}", path=path
+            f"{len(unknown)} of {len(rows)} rows match no clip: {list_some(unknown)}", path=path
         )
     return entries_by_clip, unknown
 
@@ -251,7 +254,7 @@ def _read_rows(path: Path) -> list[dict[str, str]]:
     for number, row in enumerate(rows, 2):
         if None in row or None in row.values():
             raise OptionError(
-                f"row {number} has not the {len(head)} columns of the head", path=path
+                f"row {number} does not have the {len(head)} columns of the header", path=path
             )
     return [{cell_text(key): cell_text(value) for key, value in row.items()} for row in rows]
 
@@ -259,7 +262,7 @@ def _read_rows(path: Path) -> list[dict[str, str]]:
 def _match_columns(match: str) -> list[str]:
     text = match.replace("{{", "").replace("}}", "")
     if set("{}") & set(FIELD.sub("", text)):
-        raise OptionError(f"match {match!r}: columns are in braces, such as {{subject:0>2}}")
+        raise OptionError(f"match {match!r}: unbalanced braces; write columns like {{subject:0>2}}")
     return [name for name, _ in FIELD.findall(text)]
 
 
@@ -270,7 +273,9 @@ def _namer(
         form = match
         for name in _match_columns(form):
             if name not in head:
-                raise OptionError(f"no column {name!r}; there are {among(head, name)}", path=path)
+                raise OptionError(
+                    f"no column {name!r}; the columns are {among(head, name)}", path=path
+                )
 
         def formatted(row: Mapping[str, str]) -> str:
             try:
@@ -282,8 +287,8 @@ def _namer(
     column = next((name for name in NAMES if name in head), None)
     if column is None:
         raise OptionError(
-            f"no column {', '.join(NAMES)} names the clips; give match, such as "
-            "{subject}_{trial}",
+            f"no column is called {', '.join(NAMES)}; build clip names with match, such as "
+            f"{{subject}}_{{trial}}",
             path=path,
         )
     return lambda row: row[column].strip()
@@ -300,8 +305,8 @@ def _chosen_columns(
     odd = [name for name in columns if not _is_key(name) and name not in used]
     if odd:
         raise OptionError(
-            f"{among(odd, None)}: no key of the metadata; name the columns to take, such "
-            f"as description={odd[0]}",
+            f"{among(odd, None)}: not metadata keys; choose columns with take, such as "
+            f"description={odd[0]}",
             path=path,
         )
     return {name: name for name in columns if _is_key(name)}
@@ -315,7 +320,7 @@ def _parse_take(path: str | os.PathLike[str], head: Sequence[str], text: str) ->
     elif not equals:
         column = text
     if column not in head:
-        raise OptionError(f"no column {column!r}; there are {', '.join(head)}", path=path)
+        raise OptionError(f"no column {column!r}; the columns are {', '.join(head)}", path=path)
     return key, column
 
 

@@ -125,9 +125,9 @@ def edit(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Edit
 def _check_editable(clip: Clip, joint: int | str) -> int:
     """The index of a joint that may be edited."""
     if clip.container.salvage:
-        raise OptionError("a file that is salvaged cannot be edited", clip=clip.name)
+        raise OptionError("a damaged file opened with salvage cannot be edited", clip=clip.name)
     if not clip.signals[0].has_poses:
-        raise OptionError("its motion has channels of its own, no joints", clip=clip.name)
+        raise OptionError("its motion signal is not made of joints", clip=clip.name)
     index = clip.skeleton.find(joint)
     if not clip.skeleton.joints[index].channels:
         name = clip.skeleton.addresses()[index]
@@ -144,10 +144,10 @@ def _own_groups(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ..
     """The joint's groups, which contain no channel of another joint."""
     groups, mixed = groups_of(clip, (_check_editable(clip, joint),))
     if mixed is not None:
-        text = f"replaced alone, codec {info.codec.name} codes its channels"
+        text = f"replaced alone: codec {info.codec.name} codes its channels"
         raise coded_together(clip, *mixed, text)
     if info.codec.recode is None:
-        raise OptionError(f"codec {info.codec.name} cannot encode one joint again")
+        raise OptionError(f"codec {info.codec.name} cannot re-encode a single joint")
     return groups
 
 
@@ -160,7 +160,9 @@ def _check_values(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDAr
     if given.ndim == 1 and shape[1] == 1:
         given = given[:, None]
     if given.shape != shape:
-        raise MotionError(f"new values of shape {given.shape}, not {shape}", clip=clip.name)
+        raise MotionError(
+            f"the new values have shape {given.shape}; expected {shape}", clip=clip.name
+        )
     return given
 
 
@@ -186,7 +188,9 @@ def _edit_signal(
         given = np.where(valid, given, 0.0)
         whole = np.rint(given)
         if (np.abs(whole) > MAX_INTEGER).any() or (not on_grid and (whole != given).any()):
-            raise MotionError("its values are integers up to 2^53", clip=clip.name)
+            raise MotionError(
+                "this clip holds only integers up to 2^53; a new value is none", clip=clip.name
+            )
         given = whole
     new[:, columns] = np.where(valid, given, new[:, columns])
     mask[:, columns] = valid
@@ -214,13 +218,13 @@ def _place_on_grids(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> S
             f"hold {values[row + rows.start, columns[at]]!r}"
         )
         if not on_grid:
-            raise MotionError(f"{what}; on_grid takes the nearest that it holds")
+            raise MotionError(f"{what}; use on_grid to round to the nearest value")
         placed = ordinals[rows][:, columns]
         nearest = grid.values(placed)
         given = values[rows][:, columns]
         beyond = (np.abs(placed) >= grid.limit) | ~np.isfinite(nearest) | ~np.isfinite(given)
         if (beyond & block).any():
-            raise MotionError(f"{what}, nor one that is near")
+            raise MotionError(f"{what}, nor a value near it")
         values[rows, columns] = np.where(block, nearest, given)
     return replace(signal, values=values)
 
@@ -321,7 +325,9 @@ def _decode_recoded(
         ordinals = source.ordinals(span.first, span.stop)[:, columns]
         ordinals = ordinals[(a - span.first) * per_frame : (b - span.first) * per_frame]
         if (decoded[(a - start) * per_frame : (b - start) * per_frame] != ordinals).any():
-            raise AssertionError(f"codec {info.codec.name}: the joint does not come back")
+            raise AssertionError(
+                f"codec {info.codec.name}: the decoded joint differs from the new values"
+            )
     return signal if signal.values.dtype == np.int64 else settle(signal)[1]
 
 

@@ -258,7 +258,7 @@ class Restorer:
 
         key, packets = encode_packets(shape, lambda block: shape.block(block, read), self.step)
         if key != one.key:
-            raise NotThatError("the recovered bytes are not the protected ones")
+            raise NotThatError("the recovered bytes differ from the protected ones")
         at = shape.chunk_offset
         for data in chunk_bytes(shape, packets):  # which reads meanwhile
             self.out.seek(at)

@@ -77,8 +77,9 @@ def delete_clips(
         missed = [alias for _, alias in others if (ALIAS, alias) not in gone]
         if missed and not aliases:
             raise OptionError(
-                f"{list_some(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
-                "under another name, which would be deleted, too; name it, or set aliases",
+                f"{list_some(missed)} {('is' if len(missed) == 1 else 'are')} the same "
+                "content under another name, which would be deleted too; name it, or set "
+                "aliases",
                 path=file.name,
             )
         gone |= dict.fromkeys(others)
@@ -100,10 +101,12 @@ def _find_thing(file: File, name: str) -> Thing:
     if len(clips) == 1:
         return CLIP, clips[0]
     if clips:
-        raise OptionError(f"{name!r} may be {list_some(clips)}; choose one", path=file.name)
+        raise OptionError(f"{name!r} is ambiguous: {list_some(clips)}; choose one", path=file.name)
     near = nearest(name, [other for _, other in things_in(file)])
     suggestion = f"; did you mean {near}?" if near else ""
-    raise OptionError(f"nothing is called {name!r}{suggestion}", path=file.name)
+    raise OptionError(
+        f"no clip, attachment or alias is called {name!r}{suggestion}", path=file.name
+    )
 
 
 def _plan_without(file: File, gone: Collection[Thing]) -> Plan:
@@ -170,12 +173,12 @@ def _refuse_equal(file: File, plan: Plan) -> None:
     for (kind, name), number in names.items():
         if number > 1:
             kinds = "aliases" if kind == ALIAS else f"{kind}s"
-            raise OptionError(f"two {kinds} would be called {shown(name)}", path=file.name)
+            raise OptionError(f"two {kinds} would have the name {shown(name)}", path=file.name)
     before = Counter(path_of(file, thing) for thing in plan.things)
     after = Counter(path_of(file, thing, change) for thing, change in plan.things.items())
     for path, number in after.items():
         if path and number > 1 and number > before[path]:
-            raise OptionError(f"two files would be restored as {shown(path)}", path=file.name)
+            raise OptionError(f"two files would be restored to {shown(path)}", path=file.name)
 
 
 def reorder_clips(
@@ -197,7 +200,7 @@ def reorder_clips(
     if isinstance(names, str):
         names = [names]
     if not names and by is None:
-        raise OptionError("no order: name clips, or give a key to sort by")
+        raise OptionError("no order given: name clips, or give a key to sort by")
     with rewriting(target, output, force=force) as job:
         file = job.file
         rest = list(file) if by is None else in_order(file, list(file), by)
@@ -251,7 +254,7 @@ def split(
         outputs = {v: folder / portable(f"{v.replace('/', '_')}.mcz") for v in groups}
         for path in () if force else outputs.values():
             if os.path.lexists(path):
-                raise ExistsError("it exists", path=path, hint=Hint.FORCE)
+                raise ExistsError("already exists", path=path, hint=Hint.FORCE)
         folder.mkdir(parents=True, exist_ok=True)
         step = steps(progress, len(file.clips))
         for value, names in groups.items():

@@ -78,7 +78,7 @@ def _refuse_same(source: ByteSource, target: Target) -> None:
         with suppress(OSError):
             if Path(source.target).samefile(target):
                 raise OptionError(
-                    "the damaged file is not overwritten; name another", path=source.name
+                    "the output is the damaged file itself; name another output", path=source.name
                 )
 
 
@@ -120,7 +120,7 @@ def _size_of_whole(out: BinaryIO, stop: int, required: Content, outcome: Repair)
         if not (required | _content(ByteSource(out, size=size))) <= _content(whole):
             return 0
         if end < size:
-            outcome.damage.append(f"{size - end:,} bytes behind its end are no part of the file")
+            outcome.damage.append(f"{size - end:,} bytes after its end do not belong to the file")
         return end
     return 0
 
@@ -193,13 +193,13 @@ def write_whole(file: File, stream: BinaryIO, outcome: Repair, progress: Progres
         for text in repairer.left_out:
             (attempt.damage if text == UNPROTECTED else attempt.lost).append(f"left out: {text}")
         if not (attempt.clips or attempt.runs or attempt.attachments or attempt.skeletons):
-            raise FormatError("no clip, skeleton or attachment in it is whole", path=file.name)
+            raise FormatError("no clip, skeleton or attachment is intact", path=file.name)
         problems = _check_output(stream, attempt.size, file.container.max_decoded)
         if not problems:
             return attempt
         for name in {_clip_at(repairer, problem.offset) for problem in problems}:
             if not name or degrees.get(name, FULL) == NO_PART:
-                raise FormatError(f"the repaired file is not sound: {problems[0].message}")
+                raise FormatError(f"the repaired file is invalid: {problems[0].message}")
             degrees[name] = degrees.get(name, FULL) + 1
         stream.seek(0)
         stream.truncate()

@@ -227,7 +227,8 @@ def disk_path(target: Target) -> Path:
     """The path of a file that can be rewritten in place; raises OptionError for any other."""
     if not isinstance(target, (str, os.PathLike)) or "://" in str(target):
         raise OptionError(
-            "only a file on disk can be rewritten in place; name an output", path=named_path(target)
+            "only a file on disk can be rewritten in place; name an output file",
+            path=named_path(target),
         )
     return Path(target).resolve()
 

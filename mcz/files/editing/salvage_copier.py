@@ -199,7 +199,7 @@ class Repairer(Copier):
         base = self._skeletons.get(fields.base) if fields.base else None
         try:
             if base != (fields.base or None):
-                raise FormatError("its base is not the original one")
+                raise FormatError("its base skeleton is not the original one")
             if fields.source:
                 self.file.skeleton_bytes(id_)
             return super().skeleton(id_)
@@ -228,7 +228,7 @@ class Repairer(Copier):
             note_source(new, NOTE_OF_SIGNALS)
         try:
             if self._degree_of(cut) >= WITHOUT_SOURCE_FILE and new.source:
-                raise FormatError("its result differs from the clip")
+                raise FormatError("the copied clip differs from the original")
             hashes = super().finish_record(cut, new)
         except FormatError as error:
             if new.source is None:

@@ -235,7 +235,7 @@ def _restore(shared: tuple[File, object], one: StoredFile) -> bytes:
     if kind == SKELETON:
         return file.skeleton_bytes(bytes.fromhex(name))
     if one.kind == ALIAS and name not in (file.clips if kind == CLIP else file.attachments):
-        raise FormatError(f"alias {one.name!r} names {name!r}, which is not there")
+        raise FormatError(f"alias {one.name!r} refers to {name!r}, which does not exist")
     return file.clips[name].source_bytes() if kind == CLIP else file.attachments[name].read()
 
 
@@ -280,7 +280,7 @@ class _Writing:
         if self._names == "strict" and path in self._notes:
             raise FormatError(self._notes[path])
         if path in self._written:
-            raise FormatError("another file in the archive has the same path")  # PATH-06
+            raise FormatError("another file of the archive has the same path")  # PATH-06
         self.is_damaged = True
         data = restore()
         self.is_damaged = False

@@ -176,7 +176,7 @@ def needed_chunks(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
 def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
     """A clip from its CLIP alone; raises FormatError."""
     if not fields.name or not fields.signals:
-        raise FormatError("a clip without a name or a signal", where=f"chunk {chunk.label}")
+        raise FormatError("a clip must have a name and a signal", where=f"chunk {chunk.label}")
     check_roles(fields.signals, f"chunk {chunk.label}")
     return ClipRow.of(fields, chunk)
 
@@ -241,8 +241,8 @@ class ClipState:
         where = f"{self._where}, frame {header.first}"
         if header.n_frames != 1 or header.flags & ~(FRESH | MASKS):
             raise UnsupportedError(
-                f"a segment of {header.n_frames} frames, flags {header.flags}, "
-                "cannot be followed; read the whole file",
+                f"a segment of {header.n_frames} frames with flags {header.flags} cannot be "
+                "read live; read the whole file",
                 where=self._where,
             )
         try:
@@ -250,7 +250,9 @@ class ClipState:
         except TruncatedError as error:
             raise FormatError(str(error), where=where) from None
         if table.payload_size != len(payload):
-            raise FormatError(f"{len(payload)} bytes of streams", where=where)
+            raise FormatError(
+                f"the sizes of the streams do not add up to {len(payload)} bytes", where=where
+            )
         streams = [
             payload[at : at + size] for at, size in zip(table.offsets, table.lengths, strict=True)
         ]
@@ -269,7 +271,7 @@ class ClipState:
         hashes = fields.value_sha256
         if len(hashes) != self.n_signals:
             raise FormatError(
-                f"{len(hashes)} hashes of {self.n_signals} signals", where=self._where
+                f"{len(hashes)} hashes for {self.n_signals} signals", where=self._where
             )
         if self._digest.digest() != hashes[0]:
-            raise ChecksumError("its frames differ from the hash of its end", where=self._where)
+            raise ChecksumError("its frames differ from the hash in CEND", where=self._where)

@@ -215,7 +215,7 @@ def _to_floats(row: ArrayLike) -> NDArray[np.float64]:
     try:
         return np.asarray(row, np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise MotionError(f"a row that is not one of numbers: {error}") from None
+        raise MotionError(f"a row is not numeric: {error}") from None
 
 
 def _drain(sink: io.BytesIO) -> bytes:
@@ -232,7 +232,7 @@ def markers(names: Sequence[str]) -> Skeleton:
     OptionError for no names, an empty one, or coordinates in another order.
     """
     if not names or not all(names):
-        raise OptionError("a stream needs names of markers, none of them empty")
+        raise OptionError("a stream needs marker names, and none may be empty")
     split = [name.rpartition(".") for name in names]
     named_axes = [(marker, axis.removeprefix("t")) for marker, _, axis in split]
     if len(names) % 3 == 0 and {axis for _, axis in named_axes} == set(AXES):
@@ -240,8 +240,7 @@ def markers(names: Sequence[str]) -> Skeleton:
         expected = [(marker, axis) for marker in chosen for axis in AXES]
         if named_axes != expected:
             raise OptionError(
-                f"{', '.join(names[:3])}, ... name coordinates, but not x, y and z of each marker "
-                "in turn"
+                f"{', '.join(names[:3])}, ... must name x, y and z of each marker in turn"
             )
         names = chosen
     channels = tuple(map(Channel, POSITION_KINDS))
@@ -270,7 +269,7 @@ def stream_decode(
     and ChecksumError where all of its frames came and differ from its hash.
     """
     if lost not in LOST:
-        raise OptionError(f"lost is {lost!r}, not one of {', '.join(LOST)}")
+        raise OptionError(f"lost is {lost!r}; it must be one of {', '.join(LOST)}")
     return LiveReader(_stream_of(source), lost, join, rate, post_filter=post_filter)
 
 
@@ -280,7 +279,9 @@ def _stream_of(source: object) -> Any:
     if isinstance(source, bytes | bytearray | memoryview):
         return io.BytesIO(source)
     if isinstance(source, str) or not isinstance(source, Iterable):
-        raise OptionError(f"cannot read from {source!r}: neither a binary stream nor bytes")
+        raise OptionError(
+            f"cannot read from {source!r}, which is neither a binary stream nor bytes"
+        )
     return _PieceStream(source)
 
 
@@ -370,7 +371,7 @@ class _PieceStream:
         """The next piece that is not empty, of any size; empty at the end."""
         for piece in self._pieces:
             if not isinstance(piece, bytes | bytearray | memoryview):
-                raise OptionError(f"cannot read from {piece!r}: not bytes")
+                raise OptionError(f"cannot read from {piece!r}, which is not bytes")
             if piece:
                 return bytes(piece)
         return b""

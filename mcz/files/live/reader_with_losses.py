@@ -193,7 +193,8 @@ class FramesWithLosses:
             return
         if followed is None:
             raise UnsupportedError(
-                f"clip {fields.name!r} needs all of its frames, and cannot be read with losses"
+                f"clip {fields.name!r} cannot be read with losses, because its codec needs "
+                "all frames"
             )
         counts = followed.info.layout.n_channels, self._lost, followed.shown, self._spend
         self._course = _ClipCourse(followed, event.data, Concealer(*counts, join=self._joining))
@@ -219,8 +220,8 @@ class FramesWithLosses:
             self._all_checked = self._all_checked is not False
         elif frames.is_whole:
             raise ChecksumError(
-                f"clip {course.followed.clip.name!r} was closed with {fields.n_frames} frames, "
-                "others came"
+                f"clip {course.followed.clip.name!r} was closed with {fields.n_frames} "
+                "frames, but another number arrived"
             )
         else:
             self._all_checked = False
@@ -295,7 +296,7 @@ class _ClipCourse:
     def decode(self, number: int, stream: bytes, fresh: bool) -> NDArray[np.float64]:
         """The values of a frame; raises FormatError, and counts it as lost then."""
         if number < self.at and not fresh:
-            raise LostFrameError(f"frame {number} came after frame {self.at - 1}")
+            raise LostFrameError(f"frame {number} arrived after frame {self.at - 1}")
         if number > self.at:
             self.followed.decoder.skip(number - self.at)
         self.at = number + 1

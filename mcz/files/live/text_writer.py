@@ -102,11 +102,13 @@ def _open_source(
     text_format = FORMATS.get(source_format)
     if text_format is None or text_format.arrive is None:
         able = ", ".join(f.name for f in FORMATS.values() if f.arrive is not None)
-        raise OptionError(f"format {source_format!r} cannot come line by line; these can: {able}")
+        raise OptionError(
+            f"format {source_format!r} cannot be read line by line; these can: {able}"
+        )
     base = None
     if text_format.wants_skeleton:
         if options.skeleton is None or options.skeleton == NONE:
-            raise OptionError(f"{source_format} that comes line by line needs its skeleton file")
+            raise OptionError(f"{source_format} read line by line needs its skeleton file")
         base = in_unit(read_skeleton(options.skeleton), options.unit)
     arriving: Arriving = text_format.arrive(iter(lines), base)
     return arriving, base
@@ -135,5 +137,5 @@ def suffix_of(data: bytes, format_name: str | None) -> str:
     """The suffix of files of a source format, or the likely one of ``data``; OptionError."""
     formats = likely_formats(data) if format_name is None else (format_name,)
     if not formats:
-        raise OptionError("unknown format; name it")
+        raise OptionError("the format is unknown; name it")
     return FORMATS[formats[0]].suffix

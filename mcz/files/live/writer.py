@@ -113,7 +113,7 @@ class LiveWriter:
         repeat: int | None = None,
     ) -> None:
         if repeat is not None and repeat < 0:
-            raise OptionError(f"repeat is {repeat}, not 0 or more")
+            raise OptionError(f"repeat is {repeat}; it must be 0 or more")
         self.n_frames, self._gaps = 0, MissingRunCounter(first_number)
         self.entry: int | None = None
         self._repeat, self._n_fresh, self._changed = repeat, 0, set[str]()
@@ -187,8 +187,8 @@ class LiveWriter:
         row = np.asarray(values, np.float64)
         if row.shape != (self._n_channels,):
             raise MotionError(
-                f"frame {self.n_frames}: values of shape {row.shape}, "
-                f"the skeleton has {self._n_channels} channels"
+                f"frame {self.n_frames}: values have shape {row.shape}, but the skeleton has "
+                f"{self._n_channels} channels"
             )
         with defer_sigint():
             try:
@@ -336,14 +336,17 @@ def _open_coders(
     codec: Codec, motion: Motion, options: Params, writer: Writer
 ) -> tuple[LiveEncoder, LiveDecoder]:
     if codec.live is None or codec.follow is None:
-        raise OptionError(f"codec {codec.name} does not code frame by frame")
+        raise OptionError(f"codec {codec.name} does not work frame by frame")
     if find_targets(options):
         raise OptionError(
-            f"{', '.join(find_targets(options))}: needs all frames, and none is known yet"
+            f"{', '.join(find_targets(options))}: a live stream cannot meet a target that "
+            "depends on all frames"
         )
     layout = MemorySource(motion, 0, codec, writer.profile.segment_bytes).layout
     if len(layout.groups) != 1:
-        raise MotionError(f"codec {codec.name}: {len(layout.groups)} groups, live there is one")
+        raise MotionError(
+            f"codec {codec.name}: {len(layout.groups)} groups, but a live clip has one"
+        )
     encoder = codec.live(layout, options)
     known = replace(layout, find_model=model_finder(encoder.models))
     return encoder, codec.follow(encoder.header, known)

@@ -66,7 +66,7 @@ class _Parser:
 
     def query(self) -> Node:
         if self.token.kind == "end":
-            raise OptionError("where: the text is empty")
+            raise OptionError("where: the query is empty")
         node = self.disjunction()
         if self.token.kind != "end":
             raise self.expected("'and', 'or' or the end")
@@ -226,9 +226,9 @@ def fault(text: str, at: int, what: str) -> OptionError:
 def tokens(text: str) -> Iterator[Token]:
     """The tokens of ``text``, the last one of kind "end"; raises OptionError."""
     if not isinstance(text, str):
-        raise OptionError(f"where: {shown(repr(text))} is not a text")
+        raise OptionError(f"where: {shown(repr(text))} is not a string")
     if len(text) > LONGEST:
-        raise OptionError(f"where: {len(text)} characters, {LONGEST} at most")
+        raise OptionError(f"where: {len(text)} characters exceed the limit of {LONGEST}")
     at = 0
     while at < len(text):
         match = _TOKEN.match(text, at)

@@ -163,17 +163,19 @@ class Clip(StoredClip):
     ) -> None:
         fault = times_fault(np.where(True if mask is None else mask, values, np.nan)[:, 0])
         if fault and not self.container.salvage:  # ROLE-04
-            raise FormatError(f"no times: {fault}", clip=self.name, where=f"signal {info.index}")
+            raise FormatError(
+                f"its times are unusable: {fault}", clip=self.name, where=f"signal {info.index}"
+            )
 
     def _info(self, signal: int) -> SignalInfo:
         if not 0 <= signal < len(self.signals):
-            raise OptionError(f"it has {len(self.signals)} signals, not {signal}", clip=self.name)
+            raise OptionError(f"no signal {signal}: it has {len(self.signals)}", clip=self.name)
         return self.signals[signal]
 
     def _check_resolution(self, info: SignalInfo, resolution: int) -> None:
         if not 0 <= resolution < info.counts.n_resolutions:
             raise OptionError(
-                f"it has resolutions 0 to {info.counts.n_resolutions - 1}, not {resolution}",
+                f"no resolution {resolution}: it has 0 to {info.counts.n_resolutions - 1}",
                 clip=self.name,
             )
 
@@ -182,7 +184,7 @@ class Clip(StoredClip):
         if joints is None:
             return groups_of(info.layout, range(info.layout.n_channels))
         if info.channels is not None:
-            raise OptionError(f"signal {info.name!r} has channels of its own, no joints")
+            raise OptionError(f"signal {info.name!r} is not made of joints")
         return groups_of(info.layout, joint_columns(self.skeleton, joint_list(joints)))
 
     def check_values(self, signal: int) -> None:
@@ -202,7 +204,7 @@ class Clip(StoredClip):
         stored = self.value_hashes[info.index]
         if digest != stored:
             raise ChecksumError(
-                f"value hash is {digest.hex()}, stored is {stored.hex()}",
+                f"the hash of the values is {digest.hex()}, but {stored.hex()} is stored",
                 clip=self.name,
                 where=f"signal {info.index}",
             )
@@ -273,7 +275,7 @@ class Clip(StoredClip):
         frames = range(start + skip, stop + skip, step)
         try:
             if self._row.skeleton != self._fields.skeleton:  # salvage has replaced it
-                raise FormatError("the names of its skeleton are lost")
+                raise FormatError("the joint names of its skeleton are lost")
             source = read_source(self.container, fields, info, self.signals[0], frames)
         except FormatError as error:
             self._complain(f"its source file is lost: {error}", error)
@@ -377,11 +379,13 @@ class Clip(StoredClip):
         """
         info = self.source
         if info is None:
-            raise OptionError("no source file", clip=self.name, hint=Hint.CONVERT)
+            raise OptionError("the clip has no source file", clip=self.name, hint=Hint.CONVERT)
         check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
         motion = self._motion(frames, resolution, decimate)
         if motion.source is None and self.container.salvage:
-            raise FormatError("its source file is lost", clip=self.name, hint=Hint.CONVERT)
+            raise FormatError(
+                "the source file of the clip is lost", clip=self.name, hint=Hint.CONVERT
+            )
         is_file = self.gives_file(frames, resolution)
         if not is_file:
             motion = stating_rate(motion, self.frame_numbers)
@@ -399,8 +403,8 @@ class Clip(StoredClip):
         digest = hashlib.sha256(data).digest()
         if len(data) != info.size or digest != info.sha256:  # SRC-01, SRC-02
             raise ChecksumError(
-                f"the restored {info.path} has {len(data)} bytes and hash "
-                f"{digest.hex()}, stored are {info.size} and {info.sha256.hex()}",
+                f"the restored {info.path} has {len(data)} bytes and hash {digest.hex()}, but "
+                f"{info.size} bytes and hash {info.sha256.hex()} are stored",
                 clip=self.name,
             )
 
@@ -409,5 +413,5 @@ def _reopen(container: Container, name: str) -> Clip:
     """Reopen a pickled Clip; raises OptionError if the file has changed meanwhile."""
     row = container.directory.clips.get(name)
     if row is None:
-        raise OptionError(f"the clip {name!r} is no longer there", path=container.source.name)
+        raise OptionError(f"clip {name!r} no longer exists", path=container.source.name)
     return Clip(container, row)

@@ -213,7 +213,7 @@ def find_clip_name(clips: Clips, name: str) -> str:
     if len(matches) == 1:
         return matches[0]
     if matches:
-        raise OptionError(f"{name!r} may be {list_some(matches)}; choose one")
+        raise OptionError(f"{name!r} is ambiguous: {list_some(matches)}; choose one")
     raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
 
 
@@ -296,7 +296,7 @@ class Clips(Mapping[str, Clip]):
     def __getitem__(self, name: str) -> Clip:
         """The clip that ``name`` refers to; raises UnknownNameError, which suggests a name."""
         if not isinstance(name, str):
-            raise UnknownNameError(f"{name!r} is not the name of a clip", path=self.file_name)
+            raise UnknownNameError(f"no clip is called {name!r}", path=self.file_name)
         if name not in self.rows:
             try:
                 name = find_clip_name(self, name)

@@ -125,7 +125,7 @@ def verify(
     """
     if quick:
         if where is not None:
-            raise OptionError("a quick check is of the whole file; it takes no where")
+            raise OptionError("a quick check covers the whole file, so where is not allowed")
         return quick_check(target)[1]
     with limit_jobs(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
         return validate(file, None if where is None else file.chosen(where=where))
@@ -248,7 +248,7 @@ def _check_recovery(source: ByteSource, chunk: Chunk) -> str:
     sizes = shape.chunk_offset, shape.payload_size
     if sizes != (chunk.offset, chunk.length) or shape.stop > source.size:
         raise FormatError(
-            f"it protects {shape}, not the bytes around it", where=f"chunk {chunk.label}"
+            f"it protects {shape}, not the bytes before and after it", where=f"chunk {chunk.label}"
         )
     _, packets = encode_packets(shape, lambda block: shape.block(block, source.read))
     at = chunk.payload_offset

@@ -219,7 +219,7 @@ class File:
         except MotionError:  # printed anew, and the format cannot say it
             data = b""
         if data != source.template:
-            raise FormatError(f"skeleton {id_.hex()}: its source describes another skeleton")
+            raise FormatError(f"skeleton {id_.hex()}: its source file describes another skeleton")
         # SRC-01, SRC-02
         if len(data) != source.size or hashlib.sha256(data).digest() != source.sha256:
             raise ChecksumError(f"skeleton {id_.hex()}: the restored file differs from its source")
@@ -236,7 +236,7 @@ class File:
         if len(self.clips) != 1:
             names = list_some(self.clips)
             raise OptionError(
-                f"it has {len(self.clips)} clips, choose one: {names}", path=self.name
+                f"the file has {len(self.clips)} clips; choose one: {names}", path=self.name
             )
         return next(iter(self.clips.values()))
 

@@ -52,7 +52,7 @@ def _check_and_call(
     file, size, arguments = state
     if file.size != size:
         raise FormatError(
-            f"it has changed meanwhile: {file.size} bytes, before {size}", path=file.name
+            f"the file changed meanwhile: it has {file.size} bytes, before {size}", path=file.name
         )
     return function((file, arguments), item)
 

@@ -64,7 +64,9 @@ def read(
     else:
         source_format, data = load(path)
         if source_format.is_skeleton:
-            raise OptionError("a skeleton without motion (mcz.read_skeleton reads it)", path=path)
+            raise OptionError(
+                "the file has a skeleton but no motion; read it with mcz.read_skeleton", path=path
+            )
         taken = read_motion(path, skeleton, data=data)
         if taken.remark:
             warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)

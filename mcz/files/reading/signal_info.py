@@ -177,12 +177,15 @@ def check_roles(signals: Sequence[payloads.Signal], where: str) -> None:
     """Raise FormatError for roles that signals of one clip cannot have."""
     roles = [signal.role for signal in signals]
     if payloads.MOTION in roles[1:]:  # ROLE-01
-        raise FormatError(f"{where}: a motion that is not the first signal")
+        raise FormatError(f"{where}: only the first signal can be a motion")
     if roles.count(payloads.TIMES) > 1:  # ROLE-02
-        raise FormatError(f"{where}: two signals of times")
+        raise FormatError(f"{where}: more than one signal of times")
     for index, signal in enumerate(signals):
         if signal.of is not None and (signal.of >= len(signals) or signal.of == index):  # ROLE-05
-            raise FormatError(f"{where}: signal {index} has residuals of signal {signal.of}")
+            raise FormatError(
+                f"{where}: signal {index} has residuals of signal {signal.of}, which is "
+                "itself or does not exist"
+            )
 
 
 def _check_times(info: SignalInfo, where: str) -> None:
@@ -191,7 +194,7 @@ def _check_times(info: SignalInfo, where: str) -> None:
     if not fault and codec is not None and not CODECS[codec].lossless:  # ROLE-03
         fault = f"codec {info.codec_id} is lossy"
     if fault:
-        raise FormatError(f"{where}: no times: {fault}")
+        raise FormatError(f"{where}: invalid signal of times: {fault}")
 
 
 def read_segments(container: Container, info: SignalInfo) -> None:
@@ -219,17 +222,19 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
             # refuses an impossible packet
             frame_table(row.header, info.counts, row.size, 0)
         if row.header.flags & FRAME_NOTES and not noted:  # NOTES-01
-            raise FormatError("frame notes, but no source that they belong to", where=where)
+            raise FormatError("frame notes need a source, and the clip has none", where=where)
         if not (row.header.first or row.header.flags & FRESH):  # DATA-12
-            raise FormatError("the first segment needs one before it", where=where)
+            raise FormatError("the first segment depends on an earlier one", where=where)
         check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
         n_rows = row.header.n_frames * info.layout.samples_per_frame
         check(f"{where}: rows of a segment", n_rows, container.profile.rows)  # LIMIT-19
         if row.header.first != due and not container.salvage:
-            raise FormatError(f"a segment begins at {row.header.first}, {due} is due", where=where)
+            raise FormatError(
+                f"a segment begins at frame {row.header.first}; expected {due}", where=where
+            )
         due = row.header.stop
     if due != info.layout.n_frames and not container.salvage:
-        raise FormatError(f"segments end at frame {due} of {info.layout.n_frames}", where=where)
+        raise FormatError(f"the segments end at frame {due} of {info.layout.n_frames}", where=where)
 
 
 def parse_groups(
@@ -240,14 +245,14 @@ def parse_groups(
         return (tuple(range(n_channels)),) if n_channels else ()
     if fields.kind == payloads.GROUP_JOINT:
         if skeleton is None:
-            raise FormatError("groups per joint, but the channels have no joints")
+            raise FormatError("channels are grouped by joint, but belong to no joints")
         sizes = [len(joint.channels) for joint in skeleton.joints]
     elif fields.kind == payloads.GROUP_CHANNEL:
         sizes = [1] * n_channels  # CLIP-08
     else:
         sizes = list(fields.sizes)
         if 0 in sizes or sum(sizes) != n_channels:  # CLIP-10, CLIP-11
-            raise FormatError(f"groups of {sizes} channels do not make {n_channels}")
+            raise FormatError(f"group sizes {sizes} do not add up to {n_channels} channels")
     groups, at = [], 0
     for size in sizes:
         if size:  # CLIP-08
@@ -260,10 +265,10 @@ def parse_grids(runs: Any, n_channels: int) -> tuple[Grid, ...]:
     grids: list[Grid] = []
     for run in runs:
         if not 1 <= run.n_channels <= n_channels - len(grids):  # CLIP-06, CLIP-07
-            raise FormatError(f"grids for more than its {n_channels} channels")
+            raise FormatError(f"grids are given for more than its {n_channels} channels")
         grids += [run.grid] * run.n_channels
     if len(grids) != n_channels:  # CLIP-07
-        raise FormatError(f"grids for {len(grids)} of {n_channels} channels")
+        raise FormatError(f"grids are given for {len(grids)} of {n_channels} channels")
     return tuple(grids)
 
 

@@ -345,7 +345,8 @@ class SignalReader:
         if self.info.is_integer:
             if self.info.codec.domain == "values":  # CODEC-01
                 raise FormatError(
-                    f"signal {self.info.name!r} is of integers, {self.info.codec.name} has none",
+                    f"signal {self.info.name!r} is of integers, which codec "
+                    f"{self.info.codec.name} does not support",
                     clip=self.name,
                 )
             Grid(GridKind.INTEGER).magnitudes(coded)  # refuses ordinals out of range
@@ -381,7 +382,7 @@ class SignalReader:
                 notes = self._group_notes(index, group)
                 # NOTES-07
                 if self.info.is_integer and any(g.kind != GridKind.INTEGER for _, g in notes[0]):
-                    raise FormatError("another grid in a signal of integers", clip=self.name)
+                    raise FormatError("integers must not change their grid", clip=self.name)
                 noted.add(shift, [column[c] for c in layout.groups[group]], notes)
         return noted.exceptions(), noted.grid_changes()
 

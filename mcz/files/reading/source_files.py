@@ -21,7 +21,7 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     path = Path(path)
     source_format, data = load(path)
     if not source_format.is_skeleton:
-        raise OptionError("not a skeleton file", path=path)
+        raise OptionError("the file is not a skeleton", path=path)
     skeleton: Skeleton = _read_with(path, source_format.read, data, path.stem)
     if skeleton.source is None:
         return skeleton
@@ -177,5 +177,5 @@ def parse_rate(rate: Fraction | float) -> Fraction:
     except (TypeError, ValueError, OverflowError):
         raise OptionError(f"frame rate {rate!r} is not a number") from None
     if value <= 0:
-        raise OptionError(f"frame rate {rate} is not positive")
+        raise OptionError(f"frame rate {rate} must be positive")
     return value

@@ -65,7 +65,7 @@ class StoredClip:
         fields = self.container.cend(self._row)
         has_hash = fields is not None and fields.source_sha256 is not None
         if fields is not None and has_hash != (self._fields.source is not None):  # CEND-01
-            raise FormatError("a source without a hash, or a hash without it", clip=self.name)
+            raise FormatError("a source and its hash must be given together", clip=self.name)
         return fields
 
     @cached_property
@@ -89,7 +89,7 @@ class StoredClip:
         if not self._row.rate_numerator:
             return None
         if not self._row.rate_denominator:
-            raise FormatError("frame rate with the denominator 0", clip=self.name)
+            raise FormatError("the denominator of the frame rate is 0", clip=self.name)
         return Fraction(self._row.rate_numerator, self._row.rate_denominator)
 
     @property
@@ -135,7 +135,7 @@ class StoredClip:
         """The signals; the motion, if there is one, is the first."""
         fields = self._fields
         if not fields.signals:  # CLIP-05
-            raise FormatError("it has no signal", clip=self.name)
+            raise FormatError("the clip has no signal", clip=self.name)
         check_roles(fields.signals, f"clip {self.name!r}")
         skeleton, rate = self.skeleton, self.frame_rate
         return tuple(
@@ -177,11 +177,11 @@ class StoredClip:
         try:
             start, stop = map(operator.index, frames)
         except (TypeError, ValueError):
-            raise OptionError(f"frames {frames!r}: not two integers, first and end") from None
-        if not 0 <= start <= stop <= self.n_frames:
             raise OptionError(
-                f"it has frames 0 to {self.n_frames}, not {start}:{stop}", clip=self.name
-            )
+                f"frames is {frames!r}; it must be two integers, first and end"
+            ) from None
+        if not 0 <= start <= stop <= self.n_frames:
+            raise OptionError(f"it has {self.n_frames} frames, not {start}:{stop}", clip=self.name)
         return start, stop
 
     @property
@@ -220,7 +220,7 @@ class StoredClip:
         names = [info.name for info in self.signals]
         if signal not in names:
             raise OptionError(
-                f"clip {self.name!r} has no signal {signal!r}, but {', '.join(names)}"
+                f"clip {self.name!r} has no signal {signal!r}; its signals are {', '.join(names)}"
             )
         return names.index(signal)
 
@@ -272,11 +272,11 @@ class StoredClip:
     def value_hashes(self) -> tuple[bytes, ...]:
         """The SHA-256 of the values and the mask of every signal, as the file states them."""
         if self._cend is None:  # of a damaged file
-            raise FormatError("it has no CEND", clip=self.name)
+            raise FormatError("the clip has no CEND", clip=self.name)
         hashes = tuple(bytes(each) for each in self._cend.value_sha256)
         if len(hashes) != len(self.signals):  # CEND-02
             raise FormatError(
-                f"{len(hashes)} hashes of {len(self.signals)} signals", clip=self.name
+                f"{len(hashes)} hashes for {len(self.signals)} signals", clip=self.name
             )
         return hashes
 

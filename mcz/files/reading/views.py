@@ -142,8 +142,7 @@ def _preview_frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray
         return frames, int(frames[1] - frames[0]) if len(frames) > 1 else 1
     if info.counts.n_resolutions == 1:
         raise OptionError(
-            f"codec {codec.name} has stored it in one resolution, so that "
-            "there is nothing to show without decoding it",
+            f"codec {codec.name} stored it at a single resolution, so it has no preview",
             clip=name,
         )
     step = 2 ** (info.counts.n_resolutions - 1)

@@ -66,14 +66,16 @@ def replacing(target: Target, *, force: bool, inputs: Iterable[object] = ()) -> 
             yield stream
         return
     if not isinstance(target, (str, os.PathLike)):
-        raise OptionError(f"cannot write to {target!r}: neither a path nor a binary stream")
+        raise OptionError(
+            f"cannot write to {target!r}, which is neither a path nor a binary stream"
+        )
     if os.fspath(target)[-1:] in (os.sep, os.altsep):
-        raise OptionError("a folder; name the file in it", path=target)
+        raise OptionError("it is a folder; name a file in it", path=target)
     path = Path(target)
     if path.is_dir():
-        raise OptionError("a folder; name the file in it", path=path)
+        raise OptionError("it is a folder; name a file in it", path=path)
     if not force and os.path.lexists(path):
-        raise ExistsError("it exists", path=path, hint=Hint.FORCE)
+        raise ExistsError("already exists", path=path, hint=Hint.FORCE)
     with _write_in_place(path) if _is_special(path) else _temporary(path, force) as stream:
         yield stream
 
@@ -113,7 +115,7 @@ def rereadable(stream: BinaryIO) -> Iterator[BinaryIO]:
 def _remote(target: str, force: bool) -> Iterator[BinaryIO]:
     fs, path = file_system(target)
     if not force and fs.exists(path):
-        raise ExistsError("it exists", path=target, hint=Hint.FORCE)
+        raise ExistsError("already exists", path=target, hint=Hint.FORCE)
     with fs.transaction, fs.open(path, "wb") as stream:
         yield stream
 
@@ -197,7 +199,7 @@ def _give_name(name: str, path: Path, force: bool) -> None:
         else:
             os.replace(name, path)
     except FileExistsError:
-        raise ExistsError("it exists", path=path, hint=Hint.FORCE) from None
+        raise ExistsError("already exists", path=path, hint=Hint.FORCE) from None
     except OSError as error:  # a folder, perhaps
         raise AccessError(reason_of(error), path=path) from None
 
@@ -241,7 +243,7 @@ def refuse_inputs(target: object, inputs: Iterable[object]) -> None:
         if _identity(source) == target_is:
             name = _name(target)
             other = f" ({_name(source)})" if _name(source) != name else ""
-            raise OptionError(f"{name}: it is the input itself{other}; name another output")
+            raise OptionError(f"{name}: the output is the input itself{other}; name another output")
 
 
 def _name(file: object) -> str:

@@ -107,8 +107,8 @@ def _decode(
         mask = None if signal.mask is None else signal.mask[rows]
         if not is_same or not _is_same_mask(mask, block.mask):  # CEND-07
             raise ChecksumError(
-                f"frames {block.start}:{block.stop}: codec {info.codec.name} decodes other values "
-                "than it was given",
+                f"frames {block.start}:{block.stop}: codec {info.codec.name} does not decode "
+                "to the values that it encoded",
                 where=f"signal {info.index}",
             )
         if free.any():
@@ -290,7 +290,7 @@ def _segment(
     group_notes = source.group_notes(start, stop)
     if any(group_notes):
         if profile.is_plain:  # LIMIT-21
-            raise LimitError("the profile small has no numbers beyond their grid (group notes)")
+            raise LimitError("profile small does not allow numbers off their grid (group notes)")
         flags |= GROUP_NOTES
         streams += group_notes
     masks = source.masks(start, stop)

@@ -293,7 +293,7 @@ def write(
     private (``x-...``).
     """
     if not isinstance(motion, Motion):
-        raise OptionError(f"a motion is written to a target, not {type(motion).__name__}")
+        raise OptionError(f"the first argument must be a motion, not {type(motion).__name__}")
     check_metadata(motion.metadata, motion.name)
     codec_options = encoding_options(codec, effort, params).selected_codec
     motion = with_true_sources(motion, lossless=codec_options.lossless)
@@ -337,7 +337,8 @@ def encode(
     path = Path(source)
     if up is not None and path.suffix.lower() == ".asf":
         raise OptionError(
-            "a skeleton alone is kept unchanged; give the up axis with its AMC", path=path
+            "a lone skeleton is stored unchanged; set the up axis when you encode its AMC",
+            path=path,
         )
     options = SourceOptions(
         skeleton=skeleton,

@@ -101,8 +101,7 @@ def check_bones(skeleton: Skeleton, what: str) -> None:
     """
     if has_no_lengths(skeleton):
         raise OptionError(
-            f"{what} has no meaning: {NO_LENGTHS}, so that rotations move no point; "
-            "rest offsets give them one"
+            f"{what} has no meaning: {NO_LENGTHS}, so rotations move no point; set rest offsets"
         )
 
 
@@ -219,7 +218,8 @@ def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile
     options = codec.options(params, inner=True)
     if codec.dial and find_targets(options) and options[codec.dial.parameter] is None:
         raise OptionError(
-            f"{', '.join(find_targets(options))}: {codec.dial.parameter} is not yet found"
+            f"{', '.join(find_targets(options))}: a value of {codec.dial.parameter} must be "
+            "found first"
         )
     counted = prepared.motion.counted_by_ones()
     motion = as_stored(with_source_hash(counted, lossless=codec.lossless))
@@ -254,14 +254,21 @@ def _signal_plan(
         options = codec.options({})
     signal = motion.signals[index]
     if not codec.lossless and signal.channels is not None:
-        raise MotionError(f"codec {codec.name}: signal {signal.name!r} has channels of its own")
+        raise MotionError(
+            f"codec {codec.name} needs the skeleton's channels, but signal {signal.name!r} "
+            "has its own"
+        )
     if codec.domain == "values" and signal.values.dtype == np.int64:
-        raise MotionError(f"codec {codec.name}: signal {signal.name!r} is one of integers")
+        raise MotionError(
+            f"codec {codec.name} cannot encode integers, and signal {signal.name!r} has them"
+        )
     row_bytes = 8 * max(1, signal.n_channels)
     most = min(profile.segment_bytes, profile.coded_bytes, profile.rows * row_bytes)
     source = MemorySource(motion, index, codec, most, options)
     if codec.domain == "values" and source.signal.values.dtype == np.int64:
-        raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
+        raise MotionError(
+            f"codec {codec.name} cannot encode integers, and signal {source.signal.name!r} has them"
+        )
     return SignalPlan(source, codec, codec.encode(source, options))
 
 
@@ -277,7 +284,7 @@ def clip_record(plan: ClipPlan, skeleton: bytes, template: bytes | None) -> payl
     motion = plan.motion
     rate = motion.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
-        raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
+        raise MotionError(f"frame rate {rate}: a term exceeds 2^53 - 1")
     record = payloads.Clip(
         name=motion.name,
         flags=0 if motion.frame_rate_exact else payloads.ROUNDED_RATE,
@@ -298,7 +305,7 @@ def _source_record(source: Source | None, template: bytes | None) -> payloads.Cl
     if source is None or template is None:
         return None
     if source.path and not is_plain_path(source.path):
-        raise MotionError(f"source path {source.path!r} is not relative and plain")
+        raise MotionError(f"source path {source.path!r} is not a plain relative path")
     return payloads.ClipSource(
         template=template,
         format=FORMATS[source.format].id,

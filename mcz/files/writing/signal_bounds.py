@@ -54,17 +54,19 @@ def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, d
         return motion, {}
     if codec.lossless:
         raise OptionError(
-            f"{next(iter(asked))}: codec {codec.name} promises the source byte for byte; name a "
-            "lossy codec, whose parameter lossless=all keeps the motion exact"
+            f"{next(iter(asked))}: codec {codec.name} is lossless; choose a lossy codec "
+            "(lossless=all keeps its motion exact)"
         )
     signals, numbers = list(motion.signals), {n: i for i, n in enumerate(named_signals(motion), 1)}
     remarks: dict[str, str] = {}
     for name in dict.fromkeys(key.rpartition(".")[0] for key in asked):
         if name not in numbers:
-            raise OptionError(f"no signal {name!r} other than the motion; there are {[*numbers]}")
+            raise OptionError(
+                f"no signal besides the motion is called {name!r}; there are {[*numbers]}"
+            )
         given = signals[numbers[name]]
         if given.role in EXACT_ROLES:
-            raise OptionError(f"signal {name!r} stays exact: {EXACT_ROLES[given.role]}")
+            raise OptionError(f"signal {name!r} must stay exact: {EXACT_ROLES[given.role]}")
         limits = [
             _limits(motion.skeleton, given, f"{name}.{error}", asked)
             for error in (MAX_ERROR, MEAN_ERROR)
@@ -297,7 +299,7 @@ def parse_bound(key: str, text: str) -> tuple[float, str]:
     except ValueError:
         size = math.nan
     if match is None or not 0 <= size < math.inf:
-        raise OptionError(f"{key} is {text!r}, not a number and perhaps a unit, such as 0.5mV")
+        raise OptionError(f"{key} is {text!r}; write a number and optionally a unit, such as 0.5mV")
     return size, match[2] or ""
 
 
@@ -317,7 +319,7 @@ def limits_of(
             units = " and ".join(unit for _, unit in bounds)
             own = _unit_of(skeleton, channel)
             raise OptionError(
-                f"{key}: channel {channel.label or number} is in {own or 'no unit that is known'}, "
+                f"{key}: channel {channel.label or number} is in {own or 'an unknown unit'}, "
                 f"which {units} does not fit; several bounds may be given, such as 1N,10Nmm,5"
             )
         limits.append(fitting[0])

@@ -161,7 +161,8 @@ def as_stored(motion: Motion) -> Motion:
     for signal in motion.signals:
         if signal.scaling is not None and not signal.scaling.equals(recorded.scaling):
             raise MotionError(
-                f"signal {signal.name!r}: its source has another scaling; leave out one of the two"
+                f"signal {signal.name!r} and its source have different scalings; leave out "
+                "one of the two"
             )
     return replace(motion, signals=tuple(signal.as_stored() for signal in motion.signals))
 
@@ -185,7 +186,7 @@ def settle(signal: Signal) -> Block:
     if signal.values.dtype == np.int64:
         inside = (signal.values >= -MAX_INTEGER) & (signal.values <= MAX_INTEGER)
         if not inside.all():
-            raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
+            raise MotionError(f"signal {signal.name!r}: an integer exceeds 2^53")
         return signal.values.astype(np.int64, copy=False), signal
     if len(signal.exceptions):
         signal = replace(signal, exceptions=_valid_exceptions(signal))
@@ -216,9 +217,9 @@ def _with_strays(signal: Signal, stray: NDArray[np.bool_]) -> Exceptions:
     for row, channel in zip(rows, channels, strict=True):
         if not signal.grids[channel].is_text:
             raise MotionError(
-                f"signal {signal.name!r}: row {row} of a segment, channel {channel} is "
-                f"{float(signal.values[row, channel])!r}, which its grid "
-                f"{signal.grids[channel].kind.name} does not hold"
+                f"signal {signal.name!r}: row {row} of a segment, channel {channel}: grid "
+                f"{signal.grids[channel].kind.name} does not hold "
+                f"{float(signal.values[row, channel])!r}"
             )
     old = signal.exceptions
     texts = [repr(float(v)).encode() for v in signal.values[rows, channels]]

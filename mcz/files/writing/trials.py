@@ -236,7 +236,7 @@ def meet_mean(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, di
         quarters = math.floor(4 * math.log2(target.limit / figure)) if figure else MOST_QUARTERS
         place = min(max(place + min(max(quarters, -16), 16), met + 1), missed - 1)
     if reached == math.inf:
-        raise OptionError(f"{target.name} {target.limit:g} cannot be met: {figure:g} was reached")
+        raise OptionError(f"{target.name} {target.limit:g} cannot be met; {figure:g} was reached")
     return {dial.parameter: 2.0 ** (met / 4)}, {"target_reached": repr(reached)}
 
 
@@ -279,6 +279,6 @@ def weigh_joints(
                 weights[joints] = np.minimum(weights[joints] * factor, MOST_WEIGHT)
     worst = max(zip(means, groups, strict=True), key=lambda pair: pair[0] / pair[1][2])
     raise OptionError(
-        f"quality: {worst[1][0]}={worst[1][2]:g}cm cannot be kept with {dial.parameter} "
-        f"{params.get(dial.parameter)}: {worst[0]:g} cm was reached"
+        f"quality: {worst[1][0]}={worst[1][2]:g}cm cannot be met with {dial.parameter} "
+        f"{params.get(dial.parameter)}; {worst[0]:g} cm was reached"
     )

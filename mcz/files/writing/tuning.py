@@ -87,8 +87,8 @@ def tune(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Tune
         targets = promise(options)
         if motion.skeleton.unit_cm is None:
             raise OptionError(
-                f"{codec.name}: a preset promises an error in cm, and the length unit is unknown, "
-                f"without which {codec.dial.parameter} is to be given",
+                f"{codec.name}: a preset bounds the error in cm, but the length unit is "
+                f"unknown; set it, or give {codec.dial.parameter}",
                 hint=Hint.UNIT,
             )
         check_bones(motion.skeleton, f"{codec.name}: a preset that promises an error in cm")
@@ -112,7 +112,7 @@ def _check_preset(codec: Codec, params: Params, options: Params, targets: Params
         return
     others = [*targets, *([codec.dial.parameter] if options[codec.dial.parameter] else [])]
     if others:
-        raise OptionError(f"{PRESET} and {others[0]} are given, only one can be")
+        raise OptionError(f"{PRESET} and {others[0]} exclude each other; give one of them")
 
 
 def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Limits) -> Tuned:
@@ -130,7 +130,7 @@ def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Li
         if target is None or trial.figure(target, both) <= target.limit:
             return both, {**remarks, **kept}
     name = "" if target is None else f"{target.name} {target.limit:g}"
-    raise OptionError(f"{QUALITY} and {name} cannot both be kept")
+    raise OptionError(f"{QUALITY} and {name} cannot be met together")
 
 
 def _meet_target(codec: Codec, target: Target | None, trial: Trials) -> Tuned:
@@ -174,13 +174,13 @@ def _search_dial(dial: Dial, target: Target, trial: Trials) -> Tuned:
 
 def _target(motion: Motion, dial: Dial, options: Params, targets: Params) -> Target:
     if len(targets) > 1:
-        raise OptionError(f"{' and '.join(targets)} are asked for, only one can be")
+        raise OptionError(f"{' and '.join(targets)} exclude each other; give one of them")
     ((name, limit),) = targets.items()
     if options[dial.parameter] is not None:
-        raise OptionError(f"{name} is asked for and {dial.parameter} is given, only one can be")
+        raise OptionError(f"{name} and {dial.parameter} exclude each other; give one of them")
     if name == "kbps" and not (motion.frame_rate and motion.n_frames):
         raise OptionError(
-            "kbps has no meaning: the frame rate is unknown or there are no frames", hint=Hint.RATE
+            "kbps has no meaning: the frame rate is unknown, or there are no frames", hint=Hint.RATE
         )
     if name in (MAX_ERROR, MEAN_ERROR):
         return _channel_target(motion, name, str(limit))
@@ -195,7 +195,7 @@ def _channel_target(motion: Motion, name: str, text: str) -> Target:
     limits = limits_of(motion.skeleton, channels, name, text)
     limit = parse_bound(name, text.split(",")[0])[0]
     if not limit > 0 or not (limits > 0).all():
-        raise OptionError(f"{name} is {text!r}, which no lossy channel keeps")
+        raise OptionError(f"{name} is {text!r}, but a lossy codec needs a bound above 0")
     return Target(name, limit, falls=False, weights=limit / limits)
 
 

@@ -67,7 +67,7 @@ def same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
         signal, skeleton = motion.signals[0], motion.skeleton
         try:
             if not signal.has_poses:
-                raise MotionError("its channels are not those of the skeleton")
+                raise MotionError("its channels differ from those of the skeleton")
             positions_of(skeleton, rows_of(signal, 0, min(1, signal.n_frames)))
             counts.append(len(point_names(skeleton)))
         except MczError as error:

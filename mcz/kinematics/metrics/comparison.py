@@ -60,8 +60,8 @@ def compare(
     a, b = original.signals[0], decoded.signals[0]
     if a.n_frames != b.n_frames or a.samples_per_frame != b.samples_per_frame:
         raise MotionError(
-            f"{original.name!r} has {frames_text(a)}, {decoded.name!r} has {frames_text(b)}: "
-            "only the same frames can be compared"
+            f"{original.name!r} has {frames_text(a)}, but {decoded.name!r} has "
+            f"{frames_text(b)}; only equal frames can be compared"
         )
     if shell_cm is not None:
         check_radius(shell_cm)
@@ -206,13 +206,13 @@ class PositionErrors:
                 return
             if contacts.n_frames != self._original.n_frames:
                 raise MotionError(
-                    f"contacts of {contacts.n_frames} frames, "
-                    f"{self._original.name!r} has {self._original.n_frames}"
+                    f"contacts have {contacts.n_frames} frames, but {self._original.name!r} "
+                    f"has {self._original.n_frames}"
                 )
         elif not isinstance(contacts, bool):
             joints = contacts
         if not (find_feet(self._a) if joints is None else joints):
-            notes.append(Remark("no joint is a foot by its name: no contacts", Hint.FEET))
+            notes.append(Remark("no joint is named like a foot: no contacts", Hint.FEET))
             return
         n_frames = self._original.n_frames
         ours, theirs = (FootTracks(self._a, joints, n_frames) for _ in "ab")

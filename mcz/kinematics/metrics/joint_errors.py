@@ -63,10 +63,10 @@ def joint_errors(original: Motion, other: Motion) -> JointErrors:
                 clip=motion.name,
             )
     if original.signals[0].n_rows != other.signals[0].n_rows:
-        raise MotionError(f"{original.n_frames} and {other.n_frames} frames")
+        raise MotionError(f"the numbers of frames differ: {original.n_frames} and {other.n_frames}")
     if has_no_lengths(a) != has_no_lengths(b):
         name = (original if has_no_lengths(a) else other).name
-        raise MotionError(f"{NO_LENGTHS}, but on the other side", clip=name)
+        raise MotionError(f"{NO_LENGTHS} in one skeleton, but not in the other", clip=name)
     names_a, names_b = a.addresses(), b.addresses()
     pairs = pairs_of(a, b)
     both = {names_a[i].lower() for i, _ in pairs}

@@ -44,7 +44,7 @@ LOCKED = 1e-7  # radians from gimbal lock within which the third Euler angle is 
 def check_form(form: str) -> None:
     """Raise OptionError unless ``form`` is a representation."""
     if form not in FORMS:
-        raise OptionError(f"rotations as {form!r}: one of {', '.join(FORMS)}")
+        raise OptionError(f"unknown rotations {form!r}; they must be one of {', '.join(FORMS)}")
 
 
 def check_order(order: str) -> None:
@@ -54,8 +54,8 @@ def check_order(order: str) -> None:
     apart = len(order) == 3 and letters[0] != letters[1] != letters[2]
     if not (same_case and apart and set(letters) <= set("xyz")):
         raise OptionError(
-            f"Euler order {order!r}: three axes, such as ZXY (about axes that turn along) or zxy "
-            "(about fixed axes)"
+            f"Euler order is {order!r}; it must be three axes, such as ZXY (intrinsic) or zxy "
+            "(extrinsic)"
         )
 
 
@@ -129,7 +129,9 @@ def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
     given: Floats = np.asarray(values, np.float64)
     tail = FORMS[form]
     if given.shape[-len(tail) :] != tail:
-        raise OptionError(f"rotations as {form!r} of shape {given.shape}: ends in {tail}")
+        raise OptionError(
+            f"rotations as {form!r} must have a shape that ends in {tail}, not {given.shape}"
+        )
     if form == "matrix":
         return given
     lead = given.shape[: -len(tail)]
@@ -238,7 +240,7 @@ def rotations(
     check_form(form)
     check_order(order)
     if space not in SPACES:
-        raise OptionError(f"space {space!r}: one of {', '.join(SPACES)}")
+        raise OptionError(f"unknown space {space!r}; it must be one of {', '.join(SPACES)}")
     skeleton, span = moving.skeleton, frame_range(moving, frames)
     chosen = joint_numbers(skeleton, joints)
     poses = poses_of(skeleton)
@@ -248,7 +250,7 @@ def rotations(
     converted = from_matrices(turns, form, order)
     if degrees:
         if form not in ("euler", "rotvec"):
-            raise OptionError(f"degrees: rotations as {form!r} have no angles")
+            raise OptionError(f"degrees has no meaning for rotations as {form!r}")
         converted = np.degrees(converted)
     return as_type(converted, dtype)
 
@@ -278,7 +280,8 @@ def scalar_quaternions(
         inside = any(other in starts for other in range(at - SIZE + 1, at + SIZE))
         if units[at] is False and not inside:
             raise OptionError(
-                f"{_describe_columns(names, at)} are named like a quaternion, of another norm{HINT}"
+                f"{_describe_columns(names, at)} are named like a quaternion, but their norm "
+                f"is not 1{HINT}"
             )
     apart: list[int] = []
     for at in starts:
@@ -287,7 +290,7 @@ def scalar_quaternions(
             apart.append(at)
         elif named.isdisjoint([at, *rivals]):
             raise OptionError(
-                f"{_describe_columns(names, at)} may be a quaternion, or columns beside them{HINT}"
+                f"{_describe_columns(names, at)} may be a quaternion or independent columns{HINT}"
             )
     return [tuple(range(at, at + SIZE)) for at in apart]
 

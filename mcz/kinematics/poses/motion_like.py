@@ -59,11 +59,14 @@ def frame_range(moving: MotionLike, frames: Frames) -> tuple[int, int]:
     if isinstance(frames, slice):
         start, stop, step = frames.indices(moving.n_frames)
         if step != 1:
-            raise OptionError(f"frames {frames}: neighbours only; take every n-th of the result")
+            raise OptionError(
+                f"frames is {frames}, but a step is not supported; take every n-th frame of "
+                "the result"
+            )
         return start, max(start, stop)
     start, stop = frames if frames is not None else (0, moving.n_frames)
     if not 0 <= start <= stop <= moving.n_frames:
-        raise OptionError(f"{moving.name!r} has frames 0 to {moving.n_frames}, not {start}:{stop}")
+        raise OptionError(f"{moving.name!r} has {moving.n_frames} frames, not {start}:{stop}")
     return start, stop
 
 
@@ -103,8 +106,8 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     unit_cm = unit_cm_of(unit)
     if skeleton.unit_cm is None:
         raise OptionError(
-            f"skeleton {skeleton.name!r}: its length unit is unknown, so it cannot be turned into "
-            f"{unit}; leave unit= out, or set it when reading"
+            f"the length unit of skeleton {skeleton.name!r} is unknown, so it cannot be "
+            f"converted to {unit}; leave out unit=, or set it when reading"
         )
     return skeleton.unit_cm / unit_cm
 
@@ -129,7 +132,9 @@ def signal_of(moving: MotionLike, signal: int | str) -> Any:
     if isinstance(signal, str) and signal in names:
         return moving.signals[names.index(signal)]
     if isinstance(signal, str) or not 0 <= signal < len(names):
-        raise OptionError(f"{moving.name!r} has no signal {signal!r}, but {', '.join(names)}")
+        raise OptionError(
+            f"{moving.name!r} has no signal {signal!r}; its signals are {', '.join(names)}"
+        )
     return moving.signals[signal]
 
 
@@ -137,5 +142,5 @@ def as_type(values: Reals, dtype: DTypeLike) -> Reals:
     """``values`` as float64 or float32; raises OptionError for another type."""
     new_type = np.dtype(dtype)
     if new_type not in (np.float64, np.float32):
-        raise OptionError(f"dtype {new_type}: float64 or float32")
+        raise OptionError(f"dtype is {new_type}; it must be float64 or float32")
     return values.astype(new_type, copy=False)

@@ -74,8 +74,8 @@ def resample(
     others = [signal.name for signal in motion.signals[1:] if signal.role != TIMES]
     if others and not drop_signals:
         raise OptionError(
-            f"signals other than the motion ({', '.join(others)}) are not "
-            "resampled; leave them out with drop_signals=True",
+            f"signals other than the motion ({', '.join(others)}) cannot be resampled; leave "
+            "them out with drop_signals=True",
             clip=motion.name,
         )
     if first.samples_per_frame > 1:
@@ -144,7 +144,7 @@ def too_many_frames_error(timeline: Timeline, rate: Fraction) -> OptionError:
     """The error for too many new frames."""
     since = timeline.times[-1] - timeline.times[0]
     return OptionError(
-        f"{len(timeline.times)} frames in {since:g} s make too many at {rate} a second"
+        f"{len(timeline.times)} frames in {since:g} s give too many frames at {rate} a second"
     )
 
 
@@ -190,7 +190,9 @@ def count_resampled_frames(n_frames: int, rate: Fraction, new_rate: Fraction) ->
     """Number of frames at rate ``new_rate``, from the first to at most the last."""
     count = int((n_frames - 1) * new_rate / rate) + 1 if n_frames else 0
     if count > MOST_FRAMES:
-        raise OptionError(f"{count} frames at {float(new_rate):g} a second are over {MOST_FRAMES}")
+        raise OptionError(
+            f"{count} frames at {float(new_rate):g} a second exceed the limit of {MOST_FRAMES}"
+        )
     return count
 
 

@@ -59,7 +59,7 @@ def chosen_points(skeleton: Skeleton, joints: Joints) -> list[int]:
         try:
             points.append(firsts[skeleton.find(joint)])
         except MotionError:
-            raise MotionError(f"no point {joint!r} among {among(names, joint)}") from None
+            raise MotionError(f"no point {joint!r}; the points are {among(names, joint)}") from None
     return points
 
 
@@ -181,7 +181,7 @@ class Root:
         where the up axis is unknown.
         """
         if not self.up_axis:
-            raise OptionError(f"root {self.joint!r}: the axis that points up is unknown (up=)")
+            raise OptionError(f"root {self.joint!r}: the up axis is unknown; set it with up=")
         column = column_of(self.up_axis)
         sign = float(signs_of(self.up_axis)[column])
         twist = self.rotations[:, 1 + column].astype(np.float64) * sign

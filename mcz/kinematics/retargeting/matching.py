@@ -30,22 +30,23 @@ def match_joints(
     for name, other in joint_map.items():
         if name not in theirs:
             raise OptionError(
-                f"retarget: joint_map: no joint {name!r} in the motion, among {among(theirs, name)}"
+                f"retarget: joint_map: the motion has no joint {name!r}; its joints are "
+                f"{among(theirs, name)}"
             )
         if other not in ours:
             raise OptionError(
-                f"retarget: joint_map: no joint {other!r} in the skeleton, among "
+                f"retarget: joint_map: the skeleton has no joint {other!r}; its joints are "
                 f"{among(ours, other)}"
             )
         number = ours.index(other)
         if number in pairs:
             raise OptionError(
-                f"retarget: joint_map: {theirs[pairs[number]]!r} and {name!r} both stand for "
-                f"{other!r}"
+                f"retarget: joint_map: {theirs[pairs[number]]!r} and {name!r} are both mapped "
+                f"to {other!r}"
             )
         pairs[number] = theirs.index(name)
     if not pairs:
-        raise OptionError("retarget: joint_map names no joint")
+        raise OptionError("retarget: joint_map is empty")
     return dict(sorted(pairs.items()))
 
 
@@ -55,8 +56,8 @@ def _check_names(source: Skeleton, target: Skeleton) -> None:
         for name, joint in zip(one.joint_names, one.joints, strict=True):
             if turns(joint.channels) and name not in known:
                 raise OptionError(
-                    f"retarget: the {where} has no joint {name!r}, which turns; joint_map= says "
-                    "which joints stand for each other, and leaves out the rest"
+                    f"retarget: the {where} has no joint {name!r}, which rotates; map it with "
+                    "joint_map=, which leaves out unmapped joints"
                 )
 
 

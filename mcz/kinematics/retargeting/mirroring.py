@@ -47,7 +47,7 @@ def mirror(motion: Motion, axis: str = "x", pairs: Mapping[str, str] | None = No
     whose mirror image is unknown.
     """
     if axis not in AXES:
-        raise OptionError(f"mirror: axis {axis!r} is not one of {', '.join(AXES)}")
+        raise OptionError(f"mirror: axis is {axis!r}; it must be one of {', '.join(AXES)}")
     _check(motion)
     skeleton = motion.skeleton
     others = counterparts(skeleton.joint_names, pairs)
@@ -66,15 +66,13 @@ def _check(motion: Motion) -> None:
     if len(motion.signals) > 1:
         names = ", ".join(signal.name for signal in motion.signals[1:])
         raise MotionError(
-            f"how its signals {names} look in a mirror is not known; "
-            "mirror the motion without them (dataclasses.replace, signals=motion.signals[:1])",
+            f"signals {names} cannot be mirrored; mirror the motion without them "
+            "(dataclasses.replace, signals=motion.signals[:1])",
             clip=motion.name,
         )
     for name, joint in zip(motion.skeleton.joint_names, motion.skeleton.joints, strict=True):
         if any(not channel.kind for channel in joint.channels):
-            raise MotionError(
-                f"joint {name!r} has plain scalars, and how they look in a mirror is not known"
-            )
+            raise MotionError(f"joint {name!r} has plain scalars, which cannot be mirrored")
 
 
 def _check_tree(skeleton: Skeleton, others: list[int]) -> None:
@@ -85,9 +83,9 @@ def _check_tree(skeleton: Skeleton, others: list[int]) -> None:
         if (others[parent] if parent >= 0 else -1) != there:
             on = [names[k] if k >= 0 else "nothing" for k in (parent, there)]
             raise OptionError(
-                f"mirror: {names[index]!r} hangs on {on[0]!r} and its counterpart "
-                f"{names[other]!r} on {on[1]!r}, which are no counterparts; pairs= names those "
-                "that are"
+                f"mirror: {names[index]!r} is a child of {on[0]!r} and its counterpart "
+                f"{names[other]!r} of {on[1]!r}, but these two are not counterparts; pair "
+                "them with pairs="
             )
 
 

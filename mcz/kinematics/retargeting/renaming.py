@@ -43,7 +43,7 @@ def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
     given: set[int] = set()
     for old, new in mapping.items():
         if old not in addresses:
-            raise OptionError(f"rename: no joint {old!r} among {among(addresses, old)}")
+            raise OptionError(f"rename: no joint {old!r}; the joints are {among(addresses, old)}")
         if not isinstance(new, str) or not new:
             raise OptionError(f"rename: {new!r} is not a valid name for joint {old!r}")
         index = addresses.index(old)
@@ -55,8 +55,8 @@ def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
                 addresses[k] for k, name in enumerate(names) if name == names[index]
             ]
             raise OptionError(
-                f"rename: {names[index]!r} would be the name of {len(addresses_of_name)} joints: "
-                f"{', '.join(addresses_of_name)}"
+                f"rename: {len(addresses_of_name)} joints would have the name "
+                f"{names[index]!r}: {', '.join(addresses_of_name)}"
             )
     return names
 
@@ -75,8 +75,8 @@ def with_offsets(given: Given, offsets: ArrayLike, unit_cm: float | None = None)
     new_offsets = np.asarray(offsets, np.float64)
     if new_offsets.shape != (skeleton.n_joints, 3) or not np.isfinite(new_offsets).all():
         raise OptionError(
-            f"offsets of shape {new_offsets.shape} for {skeleton.n_joints} joints: "
-            f"({skeleton.n_joints}, 3) finite numbers expected"
+            f"offsets have shape {new_offsets.shape}; {skeleton.n_joints} joints need "
+            f"({skeleton.n_joints}, 3) finite numbers"
         )
     joints = tuple(
         replace(joint, offset=(x, y, z))

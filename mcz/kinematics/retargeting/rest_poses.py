@@ -43,7 +43,7 @@ def rest_turns(
         if turn is None:
             how = "no bone" if joint in turns else "several bones"
             raise OptionError(
-                f"retarget: match_rest: joint {target.joint_names[joint]!r} has {how} to match"
+                f"retarget: match_rest: joint {target.joint_names[joint]!r} has {how} to align"
             )
         result[joint] = turn[:, :, None]
     return result
@@ -107,8 +107,8 @@ def _numbers(target: Skeleton, pairs: Mapping[int, int], alike: Iterable[str]) -
     for name in alike:
         if name not in names:
             raise OptionError(
-                f"retarget: match_rest: no joint {name!r} of the skeleton stands for one of the "
-                f"motion, but {among(list(names), name)}"
+                f"retarget: match_rest: no mapped joint of the skeleton is called {name!r}; "
+                f"the mapped joints are {among(list(names), name)}"
             )
     return {names[name] for name in alike}
 

@@ -84,7 +84,7 @@ def retarget(
     if scale is None:
         scale = size_ratio(skeleton, source, pairs)
     if not 0 < scale < math.inf:
-        raise OptionError(f"retarget: a scale of {scale} is not above 0")
+        raise OptionError(f"retarget: scale is {scale}; it must be above 0")
     values = np.asarray(motion.values, np.float64)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         made = _Retargeted(source, skeleton, pairs, values, scale, match_rest).values()
@@ -95,11 +95,12 @@ def _check(source: Skeleton, target: Skeleton) -> None:
     for skeleton in (source, target):
         if point_set(skeleton) == "markers":
             raise MotionError(
-                f"retarget: skeleton {skeleton.name!r} has markers alone, which turn no bones"
+                f"retarget: skeleton {skeleton.name!r} has only markers, which rotate no bones"
             )
     if source.up_axis and target.up_axis and source.up_axis != target.up_axis:
         raise OptionError(
-            f"retarget: {source.up_axis} points up in the motion, {target.up_axis} in the skeleton"
+            f"retarget: the up axes differ: {source.up_axis} in the motion, {target.up_axis} "
+            "in the skeleton"
         )
 
 
@@ -265,8 +266,8 @@ class Travel:
         known = place[np.isfinite(place).all(axis=1)]
         if carrier < 0 and len(known) and (known != known[0]).any():
             raise OptionError(
-                f"retarget: joint {self.source.joint_names[other]!r} moves about, and of the "
-                f"skeleton neither {self.target.joint_names[joint]!r} nor a joint above it has "
+                f"retarget: joint {self.source.joint_names[other]!r} translates, but neither "
+                f"{self.target.joint_names[joint]!r} of the skeleton nor a joint above it has "
                 "position channels"
             )
         return carrier
@@ -278,8 +279,8 @@ class Travel:
         for kind, track in zip(POSITION_KINDS, way, strict=True):
             if kind not in kinds and (np.abs(track) > least).any():
                 raise OptionError(
-                    f"retarget: joint {self.target.joint_names[joint]!r} of the skeleton has no "
-                    f"channel {kind}, along which the motion moves it"
+                    f"retarget: joint {self.target.joint_names[joint]!r} of the skeleton "
+                    f"lacks channel {kind}, along which the motion moves it"
                 )
 
     def _way(self, joint: int, other: int) -> Floats:

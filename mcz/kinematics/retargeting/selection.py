@@ -63,8 +63,8 @@ def select(
     if moved and not allow_translation:
         joint, name = next(iter(moved.items()))
         raise OptionError(
-            f"select: joint {name!r} moves {skeleton.joint_names[joint]!r}, which is kept; keep it "
-            "too, or allow_translation=True gives that one position channels"
+            f"select: joint {name!r} moves {skeleton.joint_names[joint]!r}, which is kept; "
+            "keep both, or set allow_translation=True to give the latter position channels"
         )
     numbers = {joint: number for number, joint in enumerate(kept)} | {-1: -1}
     chosen = [
@@ -81,14 +81,14 @@ def select(
 def _kept_joints(skeleton: Skeleton, joints: str | int | Iterable[str | int]) -> list[int]:
     named = [joints] if isinstance(joints, (str, int, np.integer)) else list(joints)
     if not named:
-        raise OptionError("select: no joint is to be kept")
+        raise OptionError("select: keep at least one joint")
     kept = set()
     for joint in named:
         try:
             kept.add(skeleton.find(joint))
         except MotionError:
             names = among(skeleton.joint_names, joint)
-            raise OptionError(f"select: no joint {joint!r} among {names}") from None
+            raise OptionError(f"select: no joint {joint!r}; the joints are {names}") from None
     return sorted(kept)
 
 
@@ -184,8 +184,8 @@ def bake_joints(
 def _check(skeleton: Skeleton, parent: int) -> None:
     if parent >= 0 and any(c.kind in STRETCHING for c in skeleton.joints[parent].channels):
         raise OptionError(
-            f"select: joint {skeleton.joint_names[parent]!r} stretches what hangs on it, so that "
-            "joints between it and one below it cannot be left out"
+            f"select: joint {skeleton.joint_names[parent]!r} scales its children, so joints "
+            "between it and a kept joint below it must be kept too"
         )
 
 

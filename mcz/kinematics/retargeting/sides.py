@@ -65,10 +65,10 @@ def _pair_numbers(numbers: Mapping[str, int], pairs: Mapping[str, str]) -> dict[
         for name in (one, other):
             if name not in numbers:
                 known = among(list(numbers), name)
-                raise OptionError(f"mirror: pairs: no joint {name!r} among {known}")
+                raise OptionError(f"mirror: pairs: no joint {name!r}; the joints are {known}")
         a, b = numbers[one], numbers[other]
         if partners.get(a, b) != b or partners.get(b, a) != a:
-            raise OptionError(f"mirror: pairs: {one!r} or {other!r} has two counterparts")
+            raise OptionError(f"mirror: pairs: {one!r} or {other!r} has more than one counterpart")
         partners[a], partners[b] = b, a
     return partners
 
@@ -80,8 +80,9 @@ def _mate(name: str, names: Mapping[str, int]) -> str | None:
             return others[0]
         if pattern.search(name):
             raise OptionError(
-                f"mirror: joint {name!r} is of one side by its name, and there is no joint "
-                f"{next(_swap_sides(pattern, name))!r}; pairs= names its counterpart, or itself"
+                f"mirror: joint {name!r} is named like one side, but there is no joint "
+                f"{next(_swap_sides(pattern, name))!r}; name its counterpart, or itself, with "
+                "pairs="
             )
     for pattern in (_PREFIX, _SUFFIX):
         others = [other for other in _swap_sides(pattern, name) if other in names]
@@ -90,8 +91,9 @@ def _mate(name: str, names: Mapping[str, int]) -> str | None:
     match = _PREFIX.search(name)
     if match and _BODY.match(name, match.end()):
         raise OptionError(
-            f"mirror: joint {name!r} is of one side by its name, and there is no joint "
-            f"{next(_swap_sides(_PREFIX, name))!r}; pairs= names its counterpart, or itself"
+            f"mirror: joint {name!r} is named like one side, but there is no joint "
+            f"{next(_swap_sides(_PREFIX, name))!r}; name its counterpart, or itself, with "
+            "pairs="
         )
     return None
 

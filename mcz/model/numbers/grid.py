@@ -87,7 +87,7 @@ class Grid:
         low, limit = self.lowest, self.limit
         if whole.size and not (low <= whole.min() and whole.max() <= limit):  # GRID-05
             wrong = whole.max() if whole.max() > limit else whole.min()
-            raise FormatError(f"{wrong} is not an ordinal of {self}: {low} to {limit}")
+            raise FormatError(f"{wrong} is out of the range of {self}: {low} to {limit}")
         return whole ^ (whole >> 63) if self.signed_magnitude else np.abs(whole)
 
     def values(self, ordinals: Values) -> Floats:

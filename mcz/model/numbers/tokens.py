@@ -151,7 +151,7 @@ def scan(
     if len(start) != len(stop) or (
         len(start) and not (start.min() >= 0 and (start <= stop).all() and stop.max() <= len(whole))
     ):
-        raise IndexError(f"tokens outside of a text of {len(whole)} bytes")
+        raise IndexError(f"tokens lie outside a text of {len(whole)} bytes")
     loops = kernels()
     fields = np.empty((len(start), 3), np.int64)
     n_bad = loops.scan(whole, start, stop, fields)

@@ -162,7 +162,7 @@ def read_column(
     if isinstance(kind, Sized):
         sizes, at = read_varints(data, at, count)
         if float(sizes.sum(dtype=np.float64)) > len(data) - at:  # CONV-13
-            raise TruncatedError(f"{count} values run past the end")
+            raise TruncatedError(f"{count} values extend past the end")
         ends = at + np.cumsum(sizes)
         stop = int(ends[-1]) if count else at
         blob, bounds = data[:stop].tobytes(), [at, *ends.tolist()]
@@ -189,7 +189,7 @@ def _list(values: Column) -> list[int] | list[bytes] | list[str]:
 
 def _piece(data: np.ndarray, at: int, size: int) -> np.ndarray:
     if size > len(data) - at:  # CONV-13
-        raise TruncatedError(f"{size} bytes run past the end")
+        raise TruncatedError(f"{size} bytes extend past the end")
     return data[at : at + size]
 
 
@@ -202,17 +202,17 @@ def read_varints(data: np.ndarray, at: int, count: int) -> tuple[Numbers, int]:
             few.append(value)
         return np.array(few, np.int64), at + end
     if count > len(data) - at:  # CONV-13
-        raise TruncatedError(f"{count} varints run past the end")
+        raise TruncatedError(f"{count} varints extend past the end")
     short = data[at : at + count]
     if not (short & 0x80).any():
         return short.astype(np.int64), at + count
     window = data[at : at + MOST_BYTES * count]
     ends = np.flatnonzero(window < 0x80)[:count]
     if len(ends) < count and len(window) < MOST_BYTES * count:
-        raise TruncatedError(f"{count} varints run past the end")
+        raise TruncatedError(f"{count} varints extend past the end")
     sizes = np.diff(ends, prepend=-1)
     if len(ends) < count or int(sizes.max()) > MOST_BYTES:  # CONV-03, CONV-04
-        raise FormatError("varint beyond 2^53 - 1")
+        raise FormatError("a varint exceeds 2^53 - 1")
     if (window[ends[sizes > 1]] == 0).any():  # CONV-02
         raise FormatError("a varint is not in its shortest form")
     starts = ends - sizes + 1
@@ -221,7 +221,7 @@ def read_varints(data: np.ndarray, at: int, count: int) -> tuple[Numbers, int]:
         has = np.flatnonzero(sizes > index)
         values[has] |= (window[starts[has] + index] & 0x7F).astype(np.int64) << (7 * index)
     if int(values.max()) > MAX_COUNT:  # CONV-01, CONV-03
-        raise FormatError("varint beyond 2^53 - 1")
+        raise FormatError("a varint exceeds 2^53 - 1")
     return values, at + int(ends[-1]) + 1
 
 
@@ -231,7 +231,7 @@ def build_varints(values: Sequence[int] | Numbers) -> bytes:
     if not len(column):
         return b""
     if int(column.min()) < 0 or int(column.max()) > MAX_COUNT:
-        raise FormatError(f"{column.min()} to {column.max()} are not within 0 and 2^53 - 1")
+        raise FormatError(f"{column.min()} to {column.max()} exceed the range 0 to 2^53 - 1")
     shifts = np.arange(0, 7 * MOST_BYTES, 7)
     parts = column[:, None] >> shifts
     has = parts > 0
@@ -253,7 +253,7 @@ def build_column(kind: construct.Construct, values: Column) -> bytes:
         return build_varints([len(text) for text in texts]) + b"".join(texts)
     if isinstance(kind, Exactly):
         if any(len(value) != kind.length for value in values):
-            raise FormatError(f"values are not of {kind.length} bytes")
+            raise FormatError(f"the values do not have {kind.length} bytes")
         return b"".join(map(bytes, values))
     if kind is construct.Int8ul:
         return np.asarray(values, np.uint8).tobytes()

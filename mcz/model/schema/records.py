@@ -132,7 +132,7 @@ def parse(record: type[R], data: bytes, where: str, limits: Mapping[str, int] | 
         stream = BytesIO(data)
         result = schema.parse_stream(stream, left=dict(limits or {}))
         if stream.tell() < len(data):  # CONV-12
-            raise FormatError(f"{len(data) - stream.tell()} bytes behind its end")
+            raise FormatError(f"{len(data) - stream.tell()} bytes follow its end")
         return cast(R, result)
 
     return _read(read, record, where, compiled=len(data) >= COMPILED_FROM)

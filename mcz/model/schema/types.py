@@ -42,13 +42,13 @@ def take_varint(source: Iterable[int], where: str) -> int:
     for byte in source:
         value |= (byte & 0x7F) << shift
         if value > MAX_COUNT or shift > 49:  # 8 bytes hold 56 bits (CONV-03)
-            raise FormatError("varint beyond 2^53 - 1", where=where)
+            raise FormatError("a varint exceeds 2^53 - 1", where=where)
         if byte < 0x80:
             if byte == 0 and shift:  # CONV-02
                 raise FormatError(f"varint {value} is not in its shortest form", where=where)
             return value
         shift += 7  # CONV-04
-    raise TruncatedError("a varint runs past the end", where=where)
+    raise TruncatedError("a varint extends past the end", where=where)
 
 
 def read_varint(data: bytes | bytearray | memoryview, at: int) -> tuple[int, int]:
@@ -194,7 +194,7 @@ class Counted(Subconstruct):
         left = context._params.get("left", {})
         if count > left.get(self.kind, count):
             raise LimitError(
-                f"{self.kind}: {count} are over the limit, which leaves {left[self.kind]}",
+                f"{self.kind}: {count} exceed the limit, which leaves {left[self.kind]}",
                 where=field_path(path),
             )
         if self.kind in left:
@@ -203,7 +203,7 @@ class Counted(Subconstruct):
 
     def _check(self, count: int, path: str) -> None:
         if count > self.most:  # CONV-07
-            raise construct.ValidationError(f"{count} are more than {self.most}", path=path)
+            raise construct.ValidationError(f"{count} exceed the limit of {self.most}", path=path)
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> list[object]:
         count = self.count(stream, context, path)
@@ -309,7 +309,7 @@ def inflate(data: bytes, size: int, where: str, *, words: bytes = b"") -> bytes:
     ``words``: a dictionary that distances may reach back to.
     """
     if size > MAX_RATIO * (len(data) + 1):  # LIMIT-14
-        raise LimitError(f"{len(data)} bytes cannot inflate to {size}", where=where)
+        raise LimitError(f"{len(data)} bytes cannot inflate to as many as {size}", where=where)
     inflater = zlib.decompressobj(-15, words)  # CONV-19
     try:
         out = inflater.decompress(data, size + 1)

@@ -185,7 +185,7 @@ def _points(motion: Motion, name: str, report: Callable[[int, str], None]) -> li
     """A point for each setting that works; raises OptionError if none does."""
     codec = codec_by_name(name)
     if codec.dial is None:
-        raise OptionError(f"codec {name} has no rate to vary")
+        raise OptionError(f"codec {name} has no parameter that varies its rate")
     points, why = [], ""
     for step, setting in enumerate(_settings(codec.dial)):
         text = f"{codec.dial.parameter}={setting:.4g}"
@@ -195,7 +195,7 @@ def _points(motion: Motion, name: str, report: Callable[[int, str], None]) -> li
         except MczError as error:
             why = str(error)
     if not points:
-        raise OptionError(f"codec {name}: no setting works here: {why}")
+        raise OptionError(f"codec {name}: no setting works for this motion: {why}")
     return points
 
 

@@ -67,7 +67,7 @@ def axes_of(view: str, forward: Floats) -> Floats:
     Raises OptionError for another name.
     """
     if view not in VIEWS:
-        raise OptionError(f"view {view!r} is not one of {', '.join(VIEWS)}")
+        raise OptionError(f"view is {view!r}; it must be one of {', '.join(VIEWS)}")
     round_, rise = map(math.radians, VIEWS[view])
     left = np.array([-forward[1], forward[0], 0.0])
     level = math.cos(round_) * forward - math.sin(round_) * left

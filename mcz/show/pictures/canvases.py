@@ -201,5 +201,5 @@ THEMES = {
 def theme_of(name: str) -> Theme:
     """The theme of that name; OptionError for another."""
     if name not in THEMES:
-        raise OptionError(f"theme {name!r} is not one of {', '.join(THEMES)}")
+        raise OptionError(f"theme is {name!r}; it must be one of {', '.join(THEMES)}")
     return THEMES[name]

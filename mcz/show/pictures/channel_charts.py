@@ -148,7 +148,7 @@ def _signal_of(motion: Motion, selection: Selection) -> int:
         is_empty = not motion.signals[0].n_channels and selection.joint is None
         return int(is_empty and len(motion.signals) > 1)
     if selection.joint is not None:
-        raise OptionError("a chart is of a joint or of channels of a signal, not of both")
+        raise OptionError("a chart shows either a joint or channels of a signal, not both")
     if selection.signal is not None:
         return motion.signals.index(signal_of(motion, selection.signal))
     names = set(selection.channels or ())
@@ -156,7 +156,7 @@ def _signal_of(motion: Motion, selection: Selection) -> int:
     if not having:
         known = [label for signal in motion.signals for label in _labels(signal.channels)]
         shown = among(known, next(iter(names))) if known else "none"
-        raise OptionError(f"no signal has the channels {', '.join(sorted(names))}: {shown}")
+        raise OptionError(f"no signal has the channels {', '.join(sorted(names))}; {shown}")
     return having[0]
 
 
@@ -258,7 +258,7 @@ def spectrum_chart(motion: Motion, selection: Selection) -> Chart:
     given = [*shown.series, *([] if shown.joint is None else _speed(motion, shown.joint))]
     series = [spectrum for each in given if (spectrum := _spectrum(each, rate)) is not None]
     if not series:
-        raise MotionError(f"{shown.name!r} has no known value", clip=motion.name)
+        raise MotionError(f"{shown.name!r} has only invalid values", clip=motion.name)
     per = "cycles a frame" if period is None else "Hz"
     heads = [f"{what}, {per}" for what in ("strongest", "half below", "99 % below")]
     rows: list[list[object]] = [["of", "in", *heads]]

@@ -56,7 +56,7 @@ def save(
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        raise OptionError(f"a plot is one of {', '.join(SUFFIXES)}, by its suffix", path=path)
+        raise OptionError(f"a plot must be one of {', '.join(SUFFIXES)}, by its suffix", path=path)
     colors = theme_of(theme)
     width, height = size or chart.size
     if suffix == ".html":

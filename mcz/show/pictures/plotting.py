@@ -64,7 +64,7 @@ def plot(
     """
     what = what or ("channels" if other is None else "error")
     if what not in KINDS:
-        raise OptionError(f"a plot of {what!r}: one of {', '.join(KINDS)}")
+        raise OptionError(f"unknown plot {what!r}; it must be one of {', '.join(KINDS)}")
     if (other is None) == (what == "error"):
         text = "takes the two that are compared" if what == "error" else "is of one motion"
         raise OptionError(f"a plot of {what} {text}")
@@ -72,7 +72,7 @@ def plot(
     selection = Selection(joint, signal, None if names is None else tuple(names))
     if selection != Selection() and what not in ("channels", "spectrum"):
         one = next(each for each in (joint, signal, names) if each is not None)
-        raise OptionError(f"a plot of {what} is of all joints, not of {one!r}")
+        raise OptionError(f"a plot of {what} shows all joints, so {one!r} cannot be chosen")
     size = checked_size(size)
     cut = frame_range(moving, frames)
     facts = SourceOptions(rate=rate, unit=unit, up=up)
@@ -96,7 +96,7 @@ def _chart(
 ) -> Chart:
     if what == "bytes":
         if not isinstance(moving, Clip):
-            raise OptionError("where the bytes go is asked of a clip of an .mcz", clip=moving.name)
+            raise OptionError("a plot of bytes needs an .mcz", clip=moving.name)
         return bytes_chart(moving)
     motion = _motion(moving, cut, facts)
     if other is not None:

@@ -111,7 +111,7 @@ def render(
     timeline = _timeline(moving, rate)
     first, stop = frame_range(moving, frames)
     if first == stop:
-        raise MotionError(f"{moving.name!r} has no frame there: nothing to draw")
+        raise MotionError(f"{moving.name!r} has none of these frames: nothing to draw")
     report = progress or (lambda *_: None)
     job = _Job(moving, path, look, timeline, (unit, up), force, report, notes)
     if suffix in FILMS:
@@ -133,11 +133,11 @@ def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
     suffix = Path(path).suffix.lower()
     if suffix not in (*FILMS, *STILLS):
         known = ", ".join((*FILMS, *STILLS))
-        raise OptionError(f"a picture is one of {known}, by its suffix", path=path)
+        raise OptionError(f"a picture must be one of {known}, by its suffix", path=path)
     if sheet is not None and suffix in FILMS:
-        raise OptionError("a sheet is a .png or a .svg, no film", path=path)
+        raise OptionError("a sheet must be a .png or .svg, not a film", path=path)
     if sheet is not None and not 1 <= sheet <= MOST_POSES:
-        raise OptionError(f"a sheet of {sheet} poses: 1 to {MOST_POSES}")
+        raise OptionError(f"a sheet of {sheet} poses is not possible; draw 1 to {MOST_POSES}")
     for name in NEEDED.get(suffix, ("matplotlib", "PIL")):
         library(name)  # before any work
     return suffix
@@ -147,7 +147,7 @@ def checked_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
     """Return ``size``; OptionError if a picture cannot have it."""
     if size is not None and not all(SMALLEST <= each <= GREATEST for each in size):
         raise OptionError(
-            f"a picture of {size[0]} x {size[1]} pixels: each is {SMALLEST} to {GREATEST}"
+            f"the size is {size[0]} x {size[1]} pixels; each must be {SMALLEST} to {GREATEST}"
         )
     return size
 
@@ -158,12 +158,13 @@ def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: fl
     Raises OptionError for a speed that is not a positive number.
     """
     if not 0 < speed < np.inf:
-        raise OptionError(f"speed {speed:g} is not a number above 0")
+        raise OptionError(f"speed is {speed:g}; it must be above 0")
     step = float(rate) * speed / float(fps)
     n_steps = (stop - 1 - first) / step + 1e-9 if step else np.inf
     if n_steps >= MOST_PICTURES:
         raise OptionError(
-            f"a film of {n_steps:.3g} pictures: below {MOST_PICTURES:,}", hint=Hint.FILM
+            f"the film would have {n_steps:.3g} pictures; the limit is {MOST_PICTURES:,}",
+            hint=Hint.FILM,
         )
     count = max(1, int(n_steps) + 1)
     frames: Ints = (first + np.floor(np.arange(count) * step + 0.5)).astype(np.int64)
@@ -185,7 +186,7 @@ def _timeline(moving: MotionLike, rate: float | Fraction | None) -> Timeline | N
     if moving.timeline is not None or rate is None:
         return moving.timeline
     if not 0 < rate < np.inf:
-        raise OptionError(f"frame rate {rate} is not positive")
+        raise OptionError(f"frame rate {rate} must be positive")
     known = Fraction(rate).limit_denominator(2**20) or Fraction(1, 2**20)
     return Timeline(np.arange(moving.n_frames) / float(known), known)
 
@@ -194,7 +195,7 @@ def _fps(fps: float | Fraction | None, usual: Fraction) -> Fraction:
     if fps is None:
         return usual
     if not 0 < fps <= FASTEST:
-        raise OptionError(f"{float(fps):g} pictures a second: above 0, up to {FASTEST}")
+        raise OptionError(f"fps is {float(fps):g}; it must be above 0 and at most {FASTEST}")
     return Fraction(fps).limit_denominator(1001)
 
 

@@ -241,7 +241,9 @@ class Shelf:
         """Make an ``.mcz`` from an upload; raises LimitError for too many."""
         with self._lock:
             if self._n_uploads >= MOST_UPLOADS:
-                raise LimitError(f"{MOST_UPLOADS} files were given already; start mcz view again")
+                raise LimitError(
+                    f"the limit of {MOST_UPLOADS} files is reached; start mcz view again"
+                )
             self._n_uploads += 1
         stored = Stored(name, self.write(make), kind)
         with self._lock:
@@ -307,7 +309,7 @@ def put(shelf: Shelf, path: str) -> None:
     """
     if "://" in path:
         if not path.partition("?")[0].lower().endswith(MCZ):
-            raise OptionError("of files far away only those called .mcz can be seen", path=path)
+            raise OptionError("a remote file must be an .mcz", path=path)
         shelf.give(Remote(path))
         return
     place = Path(path)
@@ -332,7 +334,9 @@ def kind_of(path: Path) -> str:
     motions = [source_format for source_format in FORMATS.values() if not source_format.is_skeleton]
     known = {MCZ: "mcz"} | {s: f.name for f in reversed(motions) for s in f.suffixes}
     if suffix not in known:
-        raise OptionError(f"its suffix is not one of {' '.join(sorted(known))}", path=path)
+        raise OptionError(
+            f"unsupported suffix; it must be one of {' '.join(sorted(known))}", path=path
+        )
     return known[suffix]
 
 
@@ -356,7 +360,7 @@ def _put_folder(shelf: Shelf, folder: Path) -> None:
         name = folder.resolve().name or "motions"
         shelf.give(Converted(shelf, name, "folder", folder, lambda out: pack(folder, out, shelf)))
     elif not shelf.given():
-        raise OptionError("there is no motion file in it", path=folder)
+        raise OptionError("the folder contains no motion file", path=folder)
 
 
 def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
@@ -370,4 +374,4 @@ def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
         if outcome.result == "failed":
             shelf.say(worded(outcome.message, shelf.hints))
     if not any(outcome.result == "parsed" for outcome in report.outcomes):
-        raise OptionError("none of its motion files can be read", path=folder)
+        raise OptionError("none of its motion files is readable", path=folder)

@@ -32,7 +32,7 @@ class Page:
         _, end, after = rest.partition(END)
         policy = POLICY.search(before)
         if not separator or not end or PLACE in after or policy is None:
-            raise FormatError(f"{name}: it is no page of the viewer of this version")
+            raise FormatError(f"{name} is not a page of this version of the viewer")
         self.text = before + PLACE + END + after
         self.before, self.after, self.policy = before, after, policy[1]
 
@@ -52,7 +52,7 @@ def page(say: Say | None = None) -> Page:
     except OSError as error:
         raise AccessError(reason_of(error), path=path) from None
     except UnicodeDecodeError:
-        raise FormatError("it is no page", path=path) from None
+        raise FormatError("not a page of the viewer", path=path) from None
 
 
 ROOT = Path(__file__).parents[3]
@@ -79,7 +79,7 @@ def built(say: Callable[[str], None], root: Path = ROOT) -> Path:
     page = folder / "dist" / "viewer.html"
     if not (folder / "build.mjs").is_file():
         text = "this installation has no page of the viewer: its wheel was built without"
-        raise AccessError(f"{text}; in a clone of the repository {COMMAND} makes it")
+        raise AccessError(f"{text}; in a clone of the repository, build it with {COMMAND}")
     if page.is_file() and not _is_older(page, _sources(root)):
         return page
     npm, node = shutil.which("npm"), shutil.which("node")
@@ -109,7 +109,7 @@ def _build(folder: Path, npm: str, node: str, say: Callable[[str], None]) -> Non
     (folder / "dist").mkdir(exist_ok=True)
     with (folder / "dist" / "building").open("wb") as stream:
         if not lock(stream):
-            raise AccessError("another process builds the page; try again soon", path=folder)
+            raise AccessError("another process is building the page; try again soon", path=folder)
         packages = folder / "node_modules" / ".package-lock.json"
         if not packages.is_file() or _is_older(packages, iter([folder / "package-lock.json"])):
             say(f"fetching the build tools of the page, once: npm ci in {folder}")

@@ -112,7 +112,7 @@ class Work:
             raise Refused(400, "no motion file was given")
         kinds = [kind_of(path) for path in motions]
         if "mcz" in kinds:
-            raise OptionError("an .mcz needs no converting; the page reads it")
+            raise OptionError("an .mcz needs no conversion; the page reads it directly")
         if len(motions) == 1:
             name, kind = motions[0].name, kinds[0]
             make = partial(encode, motions[0], facts=self._shelf.said)
@@ -254,7 +254,7 @@ def refuse_files(params: Params) -> None:
     """Raise OptionError for a parameter that names a file of this machine, except our own."""
     name = params.get(OWN_BASES)
     if isinstance(name, str) and not re.fullmatch(r"[a-z0-9_]{1,40}", name):
-        raise OptionError(f"{OWN_BASES}: the page cannot name files of this machine")
+        raise OptionError(f"{OWN_BASES}: the page cannot choose files of this machine")
 
 
 def glb_writer() -> Callable[..., Any] | None:

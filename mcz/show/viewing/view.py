@@ -78,7 +78,7 @@ def view(
     available.
     """
     if not things:
-        raise OptionError("there is nothing to view: give a Motion, a Clip or a path")
+        raise OptionError("nothing to view: give a Motion, a Clip or a path")
     facts = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
     options = {"skeleton": skeleton, **facts}
     if in_notebook():
@@ -120,7 +120,7 @@ def _player_of(thing: Thing, options: JsonObject, salvage: bool) -> str:
     with open(thing, salvage=salvage) as file:
         for clip in file:
             return player(clip)
-    raise OptionError("it has no clip", path=thing)
+    raise OptionError("the file has no clip", path=thing)
 
 
 def _give(shelf: Shelf, thing: Thing) -> None:

@@ -153,7 +153,9 @@ def _ends(data: bytes) -> tuple[int, int, int, int]:
     while end >= 0 and end + 22 + _number(data, end + 20, 2) != len(data):
         end = data.rfind(END, low, end)
     if end < 0:
-        raise SourceError("no end of a ZIP directory; no ZIP file, or cut off", offset=len(data))
+        raise SourceError(
+            "no end of a ZIP directory: not a ZIP file, or truncated", offset=len(data)
+        )
     n_members, size, start = (_number(data, end + k, n) for k, n in ((10, 2), (12, 4), (16, 4)))
     stop = end
     locator = end - 20
@@ -164,21 +166,21 @@ def _ends(data: bytes) -> tuple[int, int, int, int]:
         n_members, size, start = (_number(data, stop + k, 8) for k in (32, 40, 48))
     if start + size != stop:
         raise SourceError(
-            f"a directory from {start} on of {size} bytes, but it ends at {stop}", offset=end
+            f"a directory of {size} bytes from {start} on cannot end at {stop}", offset=end
         )
     if n_members > min(MAX_MEMBERS, size // 46):
-        raise SourceError(f"{n_members} members in a directory of {size} bytes", offset=end)
+        raise SourceError(f"{n_members} members do not fit a directory of {size} bytes", offset=end)
     return end, stop, start, n_members
 
 
 def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
     """The member whose entry of the directory is at ``at``, and where the next entry is."""
     if at + 46 > end or data[at : at + 4] != CENTRAL:
-        raise SourceError("no entry of the directory", offset=at)
+        raise SourceError("the directory has an invalid entry", offset=at)
     sizes = [_number(data, at + k, 2) for k in (28, 30, 32)]
     behind = at + 46 + sum(sizes)
     if behind > end:
-        raise SourceError("an entry of the directory runs past its end", offset=at)
+        raise SourceError("an entry of the directory extends past its end", offset=at)
     raw = data[at + 46 : at + 46 + sizes[0]]
     name = raw.decode("utf-8" if _number(data, at + 8, 2) & 0x800 else "cp437", "replace")
     size, packed, local = (value for value, _, _ in _wide_fields(data, at, sizes))
@@ -187,11 +189,13 @@ def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
         raise SourceError(f"member {name!r} has no local header at {local}", offset=at)
     start = local + 30 + _number(data, local + 26, 2) + _number(data, local + 28, 2)
     if start + packed > len(data):
-        raise SourceError(f"member {name!r} of {packed} bytes runs past the end", offset=local)
+        raise SourceError(f"member {name!r} of {packed} bytes extends past the end", offset=local)
     member = Member(name, method, flags, local, start, start + packed, at, size)
     if member.is_stored and size != packed:
         raise SourceError(
-            f"member {name!r} is stored, but {packed} bytes are said to be {size}", offset=at
+            f"member {name!r} is stored uncompressed, but its sizes differ: {packed} and "
+            f"{size} bytes",
+            offset=at,
         )
     _check_local(data, member, raw)
     return member, behind
@@ -203,7 +207,7 @@ def _check_names(members: list[Member]) -> None:
     for member in members:
         name = member.name.partition("\0")[0].removesuffix(".npy")
         if name in seen:
-            raise SourceError(f"member {name!r} is there twice", offset=member.entry)
+            raise SourceError(f"two members have the name {name!r}", offset=member.entry)
         seen.add(name)
 
 
@@ -211,14 +215,19 @@ def _check_local(data: bytes, member: Member, raw: bytes) -> None:
     """Raise SourceError where the local header of a member is about something else."""
     at = member.at
     if data[at + 30 : at + 30 + _number(data, at + 26, 2)] != raw:
-        raise SourceError(f"member {member.name!r} has another name in its header", offset=at)
+        raise SourceError(f"member {member.name!r} has another name in its local header", offset=at)
     if _number(data, at + 8, 2) != member.method:
-        raise SourceError(f"member {member.name!r} has two methods", offset=at + 8)
+        raise SourceError(
+            f"member {member.name!r} has different compression methods in directory and local "
+            "header",
+            offset=at + 8,
+        )
     packed, where, _ = _local_sizes(data, member)[1]
     is_open = packed == FULL32 or _number(data, at + 6, 2) & DESCRIBED  # said elsewhere
     if packed != member.stop - member.start and not is_open:
         raise SourceError(
-            f"member {member.name!r} has {packed} bytes and {member.stop - member.start}",
+            f"member {member.name!r} has {member.stop - member.start} bytes, but its local "
+            f"header states {packed}",
             offset=where,
         )
 

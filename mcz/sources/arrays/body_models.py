@@ -86,13 +86,14 @@ def offsets_of_model(
     except OSError as error:
         raise AccessError(reason_of(error), path=file) from None
     except UNREADABLE as error:
-        raise SourceError(f"no NPZ that can be read: {error}", path=file) from None
+        raise SourceError(f"cannot read it as an NPZ: {error}", path=file) from None
     if joints.shape != (len(parents), 3) or not np.isfinite(joints).all():
         raise SourceError(
-            f"joints of shape {joints.shape} for the {len(parents)} of kintree_table", path=file
+            f"joints have shape {joints.shape}, but kintree_table has {len(parents)} joints",
+            path=file,
         )
     if n_joints > len(parents):
-        raise OptionError(f"a model of {len(parents)} joints; expected {n_joints}", path=file)
+        raise OptionError(f"the model has {len(parents)} joints; expected {n_joints}", path=file)
     _check_tree(file, parents, n_joints)
     return offsets_of_joints(joints[:n_joints], parents[:n_joints])
 
@@ -125,17 +126,18 @@ def offsets_from_positions(
     shape = len(places), len(parents), 3
     if places.shape != shape or turns.shape != (*shape, 3):
         raise OptionError(
-            f"positions of shape {places.shape} and rotations of shape {turns.shape} for "
-            f"{len(parents)} joints: (n_frames, n_joints, 3) and (n_frames, n_joints, 3, 3)"
+            f"positions of shape {places.shape} and rotations of shape {turns.shape} do not "
+            f"fit {len(parents)} joints: (n_frames, n_joints, 3) and (n_frames, n_joints, 3, "
+            "3)"
         )
     moves = places[:, 0] if translations is None else np.asarray(translations, np.float64)
     if moves.shape != (len(places), 3):
-        raise OptionError(f"translations of shape {moves.shape} for {len(places)} frames")
+        raise OptionError(f"translations of shape {moves.shape} do not fit {len(places)} frames")
     offsets, squares, greatest, count = np.zeros((len(parents), 3)), 0.0, 0.0, 0
     worlds: list[Floats] = []
     for joint, parent in enumerate(parents):
         if not -1 <= parent < joint:
-            raise OptionError(f"joint {joint}: its parent {parent} is not before it")
+            raise OptionError(f"joint {joint}: its parent {parent} must precede it")
         above = np.broadcast_to(np.eye(3), (len(places), 3, 3)) if parent < 0 else worlds[parent]
         worlds.append(above @ turns[:, joint])
         if parent < 0 and translations is None:
@@ -145,7 +147,7 @@ def offsets_from_positions(
         seen = np.einsum("fji,fj->fi", above, step)
         seen = seen[np.isfinite(seen).all(axis=1)]
         if not len(seen):
-            raise OptionError(f"joint {joint}: no frame shows where it is on its parent")
+            raise OptionError(f"joint {joint}: no frame shows its offset from its parent")
         offsets[joint] = seen.mean(axis=0)
         away = np.square(seen - offsets[joint]).sum(axis=1)
         squares, count = squares + float(away.sum()), count + len(away)
@@ -161,8 +163,8 @@ def _check_tree(file: Path, parents: list[int], n_joints: int) -> None:
     for joint, (found, due) in enumerate(zip(parents, body.parents, strict=False)):
         if found != due:
             raise OptionError(
-                f"joint {joint} hangs on joint {found}, and {body.names[joint]!r} of "
-                f"{body.title} on {due}: a model of other joints",
+                f"joint {joint} is a child of joint {found}, but {body.names[joint]!r} of "
+                f"{body.title} is a child of {due}: the model has other joints",
                 path=file,
             )
 
@@ -182,7 +184,7 @@ class _Model:
         where = f"{self.file}: {name}"
         if not self.has(name):
             names = ", ".join(sorted(n.removesuffix(".npy") for n in self.names)[:12])
-            raise SourceError(f"{where} is missing among {names}: no model of a body")
+            raise SourceError(f"{where} is missing among {names}: not a body model")
         info = self.archive.getinfo(f"{name}.npy")
         with self.archive.open(info) as member:
             try:
@@ -193,17 +195,17 @@ class _Model:
                 }[version]
                 shape, by_columns, dtype = read(member)
             except (ValueError, KeyError, SyntaxError) as error:
-                raise SourceError(f"no NPY array: {error}", where=where) from None
+                raise SourceError(f"not an NPY array: {error}", where=where) from None
             if dtype.hasobject:
                 raise SourceError(NOT_DENSE, where=where)
             if dtype.kind not in "fiu":
-                raise SourceError(f"of type {dtype}, not numbers", where=where)
+                raise SourceError(f"the type is {dtype}, not a number", where=where)
             size = int(np.prod(shape, dtype=object)) * dtype.itemsize
             if size > min(MOST_BYTES, info.file_size):
-                raise SourceError(f"{size} bytes of shape {shape} are not there", where=where)
+                raise SourceError(f"{size} bytes of shape {shape} are missing", where=where)
             data = member.read(size)
         if len(data) != size:
-            raise SourceError(f"{len(data)} of {size} bytes", where=where)
+            raise SourceError(f"only {len(data)} of {size} bytes are present", where=where)
         return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
 
     def parents(self) -> list[int]:
@@ -214,7 +216,9 @@ class _Model:
         parents[0] = -1  # what stands there is 2^32 - 1, or -1
         for joint, parent in enumerate(parents[1:], 1):
             if not 0 <= parent < joint:
-                raise SourceError(f"joint {joint} hangs on {parent}, not before it", path=self.file)
+                raise SourceError(
+                    f"joint {joint}: its parent {parent} must precede it", path=self.file
+                )
         return parents
 
     def joints(self, betas: ArrayLike | None) -> Floats:
@@ -228,7 +232,8 @@ class _Model:
         regressor, vertices = self.array("J_regressor"), self.array("v_template")
         if regressor.ndim != 2 or vertices.shape != (regressor.shape[1], 3):
             raise SourceError(
-                f"J_regressor of shape {regressor.shape} for v_template of shape {vertices.shape}",
+                f"J_regressor of shape {regressor.shape} does not fit v_template of shape "
+                f"{vertices.shape}",
                 path=self.file,
             )
         shaped = np.asarray(vertices, np.float64)
@@ -240,12 +245,14 @@ class _Model:
     def _shape(self, betas: Floats, n_vertices: int) -> Floats:
         directions = self.array("shapedirs")
         if directions.ndim != 3 or directions.shape[:2] != (n_vertices, 3):
-            raise SourceError(f"shapedirs of shape {directions.shape}", path=self.file)
+            raise SourceError(f"shapedirs cannot have shape {directions.shape}", path=self.file)
         if betas.ndim != 1 or not np.isfinite(betas).all():
-            raise OptionError(f"betas of shape {betas.shape}: expected a row of finite numbers")
+            raise OptionError(f"betas of shape {betas.shape} are not a row of finite numbers")
         n_shapes = directions.shape[2]
         if betas[n_shapes:].any():
-            raise OptionError(f"{len(betas)} betas, and the model has {n_shapes}", path=self.file)
+            raise OptionError(
+                f"{len(betas)} betas are given, but the model has {n_shapes}", path=self.file
+            )
         betas = betas[:n_shapes]
         shape: Floats = directions[:, :, : len(betas)].astype(np.float64) @ betas
         return shape
@@ -272,7 +279,10 @@ def with_model(motion: Motion, model: str | os.PathLike[str]) -> Motion:
     if GENDER in path:
         gender = motion.metadata.get("x-gender", "")
         if not gender.isalnum():
-            raise OptionError(f"the take states no gender, but {gender!r}", path=path)
+            raise OptionError(
+                f"the take states the gender {gender!r}, which no model file is named after",
+                path=path,
+            )
         path = path.replace(GENDER, gender)
     offsets = _offsets(path, _modification_time(path), skeleton.n_joints, _betas(source))
     joints = tuple(
@@ -309,5 +319,5 @@ def _betas(source: Source) -> tuple[float, ...] | None:
     except (ValueError, TypeError, EOFError, SyntaxError) as error:
         raise SourceError(f"{SHAPE}: {error}") from None
     if not len(rows) or (rows != rows[0]).any():
-        raise SourceError(f"{SHAPE} of shape {betas.shape} say more than one shape of a body")
+        raise SourceError(f"{SHAPE} of shape {betas.shape} holds more than one body shape")
     return tuple(rows[0].tolist())

@@ -146,7 +146,7 @@ def split_clips(motion: Motion) -> dict[str, Motion]:
         clips = json.loads(motion.metadata[CLIPS])
         spans = {str(name): (int(first), int(last)) for name, (first, last) in clips.items()}
     except (KeyError, ValueError, TypeError, AttributeError, RecursionError, OverflowError):
-        raise OptionError(f"motion {motion.name!r} is no library of clips") from None
+        raise OptionError(f"motion {motion.name!r} is not a library of clips") from None
     numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
     metadata = {key: value for key, value in motion.metadata.items() if key != CLIPS}
     parts = {}

@@ -104,7 +104,7 @@ class Machine:
             at = self.opcode_at = self.at
             opcode = OPCODES.get(self.data[at]) if at < len(self.data) else None
             if opcode is None:
-                self.refuse("the pickle ends early, or has a byte that is no opcode")
+                self.refuse("the pickle ends early, or contains an invalid opcode")
             start, stop, size = self._argument(opcode, at + 1)
             self.at = stop + (opcode.arg is not None and opcode.arg.n == pickletools.UP_TO_NEWLINE)
             self._leave_frame()
@@ -116,7 +116,9 @@ class Machine:
                 elif opcode.name in OPERATIONS:
                     OPERATIONS[opcode.name](self, start, stop)
                 else:
-                    self.refuse(f"{opcode.name} makes an object of a program, and is never obeyed")
+                    self.refuse(
+                        f"{opcode.name} would create an object of a program, which is never done"
+                    )
             except (ValueError, OverflowError):
                 self.refuse(f"the argument of {opcode.name} is not valid")
 
@@ -167,7 +169,7 @@ class Machine:
             n = int.from_bytes(self.data[at - size : at], "little", signed=is_signed)
             stop = at + n if n >= 0 else len(self.data) + 1
         if stop > len(self.data):
-            self.refuse(f"the argument of {opcode.name} runs past the end")
+            self.refuse(f"the argument of {opcode.name} extends past the end")
         return at, stop, size
 
     def _leave_frame(self) -> None:
@@ -181,24 +183,24 @@ class Machine:
     def enter_frame(self, start: int, stop: int) -> None:
         end = stop + int.from_bytes(self.data[start:stop], "little")
         if end > len(self.data):
-            self.refuse("a frame runs past the end")
+            self.refuse("a frame extends past the end")
         self._frame = (start, stop, end)
 
     def put(self, index: int) -> None:
         if not 0 <= index < 2**32:
-            self.refuse(f"no place {index} of a memo")
+            self.refuse(f"index {index} of a memo is not allowed")
         self.memo[index] = self.top()
 
     def get(self, index: int) -> None:
         if index not in self.memo:
-            self.refuse(f"nothing is at place {index} of the memo")
+            self.refuse(f"index {index} of the memo is empty")
         self.stack.append(self.memo[index])
 
     def extend(self, kind: type[Dict] | type[list[object]], items: Sequence[object]) -> None:
         """Put items into the list or the Dict on top."""
         target = self.top()
         if not isinstance(target, kind) or (kind is Dict and len(items) % 2):
-            self.refuse("items are put into something else than a list or a dictionary")
+            self.refuse("items are added to something other than a list or a dictionary")
         if isinstance(target, Dict):
             target.pairs += zip(items[::2], items[1::2], strict=True)
         else:
@@ -208,14 +210,14 @@ class Machine:
         full = f"{self.text_of(module)}.{self.text_of(name)}"
         if full not in self.names:
             self.is_foreign = True
-            self.refuse(f"{full[:200]!r} is no part of an array, and is never called")
+            self.refuse(f"{full[:200]!r} does not belong to arrays, and is never called")
         self.stack.append(self.names[full])
 
     def call(self) -> None:
         """REDUCE: what the few known functions would make of their arguments."""
         arguments, function = self.pop(), self.pop()
         if not isinstance(function, Name) or not isinstance(arguments, tuple):
-            self.refuse("a call of something that is no function")
+            self.refuse("something other than a function is called")
         match function.name, arguments:
             case "_reconstruct", (Name("ndarray"), *_):
                 made: object = PickledArray()
@@ -238,14 +240,14 @@ class Machine:
             case "encode", (str(), *_):
                 made = None  # bytes, written as text
             case _:
-                self.refuse(f"{function.name} is called with other arguments than those of arrays")
+                self.refuse(f"{function.name} is called with arguments that arrays do not have")
         self.stack.append(made)
 
     def make_object(self) -> None:
         """NEWOBJ: only the wrapper of joblib."""
         arguments, of_class = self.pop(), self.pop()
         if of_class != NAMES["joblib.numpy_pickle.NumpyArrayWrapper"] or arguments != ():
-            self.refuse("an object of a class, which is never made")
+            self.refuse("it contains an object of a class, which is never created")
         self.stack.append(Wrapper())
 
     def push_storage(self) -> None:
@@ -255,7 +257,7 @@ class Machine:
                 content = self.storages.get(self.text_of(key) or "")
                 self.stack.append(Storage(DType(STORAGES[name], self.order), content, items))
             case _:
-                self.refuse("BINPERSID makes an object of a program, and is never obeyed")
+                self.refuse("BINPERSID would create an object of a program, which is never done")
 
     def build(self) -> None:
         """BUILD: the state of a type, of an array, or of joblib's wrapper."""
@@ -274,26 +276,26 @@ class Machine:
                 self.pop()
                 self.stack.append(self._read_wrapped(state))
             case _:
-                self.refuse("a state of something that is no array")
+                self.refuse("a state is set on something other than an array")
 
     def _read_wrapped(self, state: Dict) -> PickledArray:
         """The array whose bytes joblib puts behind its wrapper, after some for alignment."""
         if len(state.pairs) > MAX_STATE:
-            self.refuse("a wrapper of joblib with many fields")
+            self.refuse("a joblib wrapper has too many fields")
         known = {self.text_of(key): value for key, value in state.pairs if self.text_of(key)}
         shape, dtype, order = (known.get(key) for key in ("shape", "dtype", "order"))
         if not isinstance(shape, tuple) or not isinstance(dtype, DType) or order not in ("C", "F"):
-            self.refuse("a wrapper of joblib without shape, type or order")
+            self.refuse("a joblib wrapper lacks shape, type or order")
         digits = dtype.code[1:]
         array = PickledArray(shape, dtype, order == "F")
         if not digits.isdecimal() or dtype.code[0] == "O":
-            self.refuse(f"joblib's bytes of an array of type {dtype.code!r} are not known")
+            self.refuse(f"the joblib format of arrays of type {dtype.code!r} is unknown")
         size = size_of(array.lengths, int(digits) * (4 if dtype.code[0] == "U" else 1))
         start = self.at
         if known.get("numpy_array_alignment_bytes") is not None:
             start += 1 + (self.data[start] if start < len(self.data) else 0)
         if size is None or start + size > len(self.data):
-            self.refuse("the bytes of an array of joblib run past the end")
+            self.refuse("the bytes of a joblib array extend past the end")
         array.content = Raw(start, start + size, 0)
         self.at = start + size
         return array

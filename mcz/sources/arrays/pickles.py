@@ -82,8 +82,8 @@ def read_pickle(data: bytes, at: int = 0) -> Pickle:
     for magic, name in COMPRESSED.items():
         if data.startswith(magic, at):
             raise SourceError(
-                f"compressed by {name}; where you trust the file, write it plain in Python: "
-                "joblib.dump(joblib.load(path), path)",
+                f"compressed by {name}; if you trust the file, write it uncompressed in "
+                "Python: joblib.dump(joblib.load(path), path)",
                 offset=at,
             )
     pickle = _read_machine(machine := Machine(data, at))
@@ -110,7 +110,7 @@ def read_tensors(data: bytes) -> Pickle:
     machine = Machine(data, pickle.start, storages, ">" if is_big else "<")
     own = _read_machine(machine)
     if machine.at > pickle.stop:
-        raise SourceError("the pickle runs past its end", offset=pickle.stop)
+        raise SourceError("the pickle extends past its end", offset=pickle.stop)
     fields = sorted((*archive.fields, *own.archive.fields), key=lambda field: field.at)
     return replace(own, archive=replace(archive, fields=tuple(fields)))
 
@@ -262,7 +262,7 @@ class _Reader:
             return Head(shape=shape), "an array that shares its bytes or its shape with another"
         if code in TYPES and size_of(shape, int(code[1:])) != raw.stop - raw.start:
             raise SourceError(
-                f"{raw.stop - raw.start} bytes of numbers, but shape {shape} of {code} has "
+                f"{raw.stop - raw.start} bytes of numbers, but shape {shape} of {code} needs "
                 f"{size_of(shape, int(code[1:]))}",
                 offset=raw.start,
             )

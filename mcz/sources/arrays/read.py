@@ -57,7 +57,9 @@ def _pickled(format_name: str, name: str, pickle: Pickle) -> Motion:
         metadata = library.metadata | dict(motion.metadata)
         numbers = library.frame_numbers
         if len(numbers) != motion.n_frames:
-            raise SourceError(f"clips of {len(numbers)} frames, but a motion of {motion.n_frames}")
+            raise SourceError(
+                f"the clips have {len(numbers)} frames, but the motion has {motion.n_frames}"
+            )
         return replace(motion, metadata=metadata, frame_numbers=numbers)
     clip = {CLIP: pickle.clip} if pickle.clip else {}
     return replace(motion, metadata=clip | dict(motion.metadata))
@@ -91,8 +93,8 @@ def _motion(
     n_runs = sum(len(piece.runs) for piece in pieces)
     if len(pieces) > MAX_PIECES or n_runs > MAX_RUNS:
         raise SourceError(
-            f"{len(arrays)} arrays in {len(pieces)} pieces with {n_runs} runs of numbers are too "
-            f"many: {MAX_PIECES} pieces and {MAX_RUNS} runs at most"
+            f"{len(arrays)} arrays in {len(pieces)} pieces with {n_runs} runs of numbers "
+            f"exceed the limits of {MAX_PIECES} pieces and {MAX_RUNS} runs"
         )
     template, detail = build_arrays(pieces)
     digest = hashlib.sha256(memoryview(archive.data)[: archive.size]).digest()
@@ -149,7 +151,5 @@ def write_arrays(motion: Motion) -> bytes:
     Raises MotionError for a motion of another source: ``mcz.to_npz`` writes that one.
     """
     if motion.source is None or motion.source.format not in ("npy", "npz", "pickle", "torch"):
-        raise MotionError(
-            f"motion {motion.name!r} was not made of arrays; to_npz writes it as some"
-        )
+        raise MotionError(f"motion {motion.name!r} was not read from arrays; use to_npz")
     return restore_arrays(motion)

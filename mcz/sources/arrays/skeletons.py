@@ -57,7 +57,7 @@ def tree(which: str | int) -> BodyTree:
         if which in (each.name, each.n_joints):
             return each
     known = ", ".join(f"{each.name} ({each.n_joints} joints)" for each in trees.values())
-    raise OptionError(f"no body tree {which!r}: there are {known}")
+    raise OptionError(f"unknown body tree {which!r}; the body trees are {known}")
 
 
 def has_tree(which: str | int) -> bool:
@@ -99,13 +99,15 @@ def body_skeleton(
     """
     body = body if isinstance(body, BodyTree) else tree(body)
     if turns not in TURNS:
-        raise OptionError(f"joints turned by {turns!r}: one of {', '.join(filter(None, TURNS))}")
+        raise OptionError(
+            f"unknown turns {turns!r}; they must be one of {', '.join(filter(None, TURNS))}"
+        )
     if offsets is not None:
         offsets = np.asarray(offsets, np.float64)
         if offsets.shape != (body.n_joints, 3) or not np.isfinite(offsets).all():
             raise OptionError(
-                f"offsets of shape {offsets.shape} for the {body.n_joints} joints of {body.title}: "
-                f"({body.n_joints}, 3) finite numbers expected"
+                f"offsets have shape {offsets.shape}; the {body.n_joints} joints of "
+                f"{body.title} need ({body.n_joints}, 3) finite numbers"
             )
     joints = []
     for index, (name, parent) in enumerate(zip(body.names, body.parents, strict=True)):
@@ -131,7 +133,9 @@ KINDS = {
 def kinds_of(name: str) -> tuple[str, ...]:
     """The channel kinds of a joint, () of a robot; raises OptionError for an unknown name."""
     if name not in KINDS and name not in robot_layouts():
-        raise OptionError(f"arrays {name!r}: one of {', '.join((*KINDS, *robot_layouts()))}")
+        raise OptionError(
+            f"arrays is {name!r}; it must be one of {', '.join((*KINDS, *robot_layouts()))}"
+        )
     return KINDS.get(name, ())
 
 
@@ -157,7 +161,7 @@ def with_kinds(motion: Motion, name: str) -> Motion:
     odd = {len(joint.channels) for joint in skeleton.joints} - {1, len(kinds)}
     if rest or odd:
         each = odd.pop() if odd else skeleton.n_channels
-        raise MotionError(f"{name} are {len(kinds)} numbers a joint, but there are {each}")
+        raise MotionError(f"{name} have {len(kinds)} numbers a joint, but the array has {each}")
     channels = tuple(map(Channel, kinds))
     joints = tuple(Joint(str(number), channels=channels) for number in range(n_joints))
     angle_unit = "rad" if name == "rotation-vectors" else skeleton.angle_unit
@@ -178,7 +182,7 @@ def _as_robot(motion: Motion, name: str) -> Motion:
     if robot is None:
         n = len(robot_layouts()[name].joints)
         raise MotionError(
-            f"{name} are {n} columns, or {n + N_ROOT} with the root, "
-            f"but there are {motion.skeleton.n_channels}"
+            f"{name} has {n} columns, or {n + N_ROOT} with the root, but the array has "
+            f"{motion.skeleton.n_channels}"
         )
     return robot

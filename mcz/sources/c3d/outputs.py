@@ -115,7 +115,9 @@ def describe_outputs(outputs: Signal | None) -> Listed:
         three = channels[first : first + len(PARTS)]
         label, unit = three[0].name.removesuffix(f" {PARTS[0]}"), three[0].unit
         if [channel.name for channel in three] != [f"{label} {part}" for part in PARTS]:
-            raise MotionError(f"C3D outputs have x, y and z; {three[0].name!r} does not")
+            raise MotionError(
+                f"C3D outputs need x, y and z, but {three[0].name!r} does not have them"
+            )
         group = _list_of(unit, groups)
         listed, group_unit = groups.get(group, ([], unit))
         groups[group] = ([*listed, *({label} - {*listed})], unit if group_unit == unit else "")

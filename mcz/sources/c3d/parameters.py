@@ -173,13 +173,13 @@ def names_of(labels: list[str], n: int, what: str) -> list[str]:
 def find_parameters(data: bytes) -> tuple[Order, int]:
     """The byte order of a file and where its parameter section begins; raises SourceError."""
     if len(data) < BLOCK:
-        raise SourceError("the file ends before the end of a C3D header", offset=len(data))
+        raise SourceError("the file is truncated in its C3D header", offset=len(data))
     if data[1] != 0x50:
-        raise SourceError(f"offset 1: {data[1]:#04x} is not the 0x50 of a C3D file")
+        raise SourceError(f"offset 1: {data[1]:#04x} is not the byte 0x50 of a C3D file")
     start = (data[0] - 1) * BLOCK
     if start < BLOCK or start + 4 > len(data):
         raise SourceError(
-            f"offset 0: block {data[0]}, where the parameters begin, is not in the file"
+            f"offset 0: the parameters begin at block {data[0]}, which is not in the file"
         )
     processor = data[start + 3]
     if processor not in (INTEL, DEC, SGI):

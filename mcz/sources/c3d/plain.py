@@ -43,7 +43,7 @@ def plain(motion: Motion) -> Motion:
     others = {signal.role: signal for signal in motion.signals[1:]}
     if len(others) < len(motion.signals) - 1 or not set(others) <= set(KNOWN):
         given = ", ".join(signal.name for signal in motion.signals[1:])
-        raise MotionError(f"C3D has no place for all of the signals {given}")
+        raise MotionError(f"C3D cannot hold all of the signals {given}")
     residuals, outputs = others.get("residuals"), others.get(OUTPUTS)
     analog, scaling = _analog(others.get("analog"))
     placed = [motion.signals[0], *([outputs] if outputs is not None else [])]
@@ -51,19 +51,22 @@ def plain(motion: Motion) -> Motion:
     n_channels = analog.n_channels if analog else 0
     subframes = analog.samples_per_frame if analog and n_channels else 1
     if max(n_points, n_channels * subframes) > COUNTED:
-        raise MotionError(f"C3D has at most {COUNTED} points and analog samples a frame")
+        raise MotionError(f"C3D allows at most {COUNTED} points and analog samples a frame")
     if residuals is not None and residuals.n_channels != n_points:
-        raise MotionError(f"{residuals.n_channels} residuals for {n_points} points")
+        raise MotionError(f"{residuals.n_channels} residuals do not fit {n_points} points")
     names = [joint.name for joint in motion.skeleton.joints]
     for name in names:
         if not name or name != name.strip():
             raise MotionError(
-                f"C3D cannot hold the name {name!r}: its labels are filled with blanks"
+                f"C3D cannot hold the name {name!r}, because its labels are padded with blanks"
             )
     listed = describe_outputs(outputs)
     both = {*names} & {*listed.labels}
     if both or not all(listed.labels):
-        raise MotionError(f"C3D cannot tell outputs by their names from points: {sorted(both)}")
+        raise MotionError(
+            "C3D distinguishes outputs from points only by name, and these are both: "
+            f"{sorted(both)}"
+        )
     scale = _scale(placed, [signal for signal in (residuals, analog) if signal])
     unsigned = scale is not None and analog is not None and _range(analog)[1] > 0x7FFF
     grids = (Grid(GridKind.SCALED, scale=scale), Grid(GridKind.INTEGER)) if scale else (FLOATS,) * 2
@@ -179,7 +182,7 @@ def _layout(
     first = 1 if motion.frame_numbers is None or not motion.n_frames else motion.frame_numbers[0]
     rate = Fraction(motion.frame_rate or 0)
     if rate > MOST_RATE:
-        raise MotionError(f"C3D holds frame rates up to {MOST_RATE:.2g}, and this one is larger")
+        raise MotionError(f"C3D allows frame rates up to {MOST_RATE:.2g}, but this one is larger")
     section = section_of(section_data, -1.0 if scale is None else scale, rate, shape)
     start = BLOCK + len(section.data)
     header = bytearray(BLOCK)
@@ -272,7 +275,7 @@ class Section:
         coded = [text.encode() for text in texts]
         width = max(map(len, coded), default=0)
         if width > MAX_LABEL:
-            raise MotionError(f"a name of {width} bytes is too long for C3D, which allows 255")
+            raise MotionError(f"a name of {width} bytes is too long; C3D allows 255")
         step = min(LABELS_PER_PARAMETER, LABELS_SIZE // max(1, width))
         for number, k in enumerate(range(0, max(1, len(coded)), step), 1):
             part = coded[k : k + step]
@@ -291,7 +294,7 @@ class Section:
         self.data += b"\0\0"
         self.data += bytes(-len(self.data) % BLOCK)
         if len(self.data) > MAX_BLOCKS * BLOCK:
-            raise MotionError(f"names of {len(self.data)} bytes are too much for a C3D file")
+            raise MotionError(f"names of {len(self.data)} bytes are too long for a C3D file")
         self.data[2] = len(self.data) // BLOCK
 
 

@@ -41,7 +41,7 @@ def restore(motion: Motion, source: Source) -> bytes:
         behind = layout.gap + rotations + layout.tail
     else:
         if (layout.head[:1] or b"\0")[0] * BLOCK > len(layout.head):
-            raise MotionError("the parameters follow the data, so only whole clips can be written")
+            raise MotionError("the parameters follow the data, so only a whole clip can be written")
         behind = _padding(len(layout.head) + len(data)) + rotations + _padding(len(rotations))
         kept = layout.tail.rstrip(b"\0")
         behind += kept + _padding(len(kept))

@@ -64,10 +64,14 @@ def find_shape(data: bytes, parameters: Parameters) -> Shape:
     fitted = [(shape, *_fit(data, shape, counts, parameters)) for shape in shapes]
     shape, n_frames, _ = next((f for f in fitted if f[2]), fitted[0])
     if not shape.frame_size and n_frames > COUNTED:
-        raise SourceError(f"{n_frames} frames of nothing are declared", offset=WORD_OF_LAST)
+        raise SourceError(
+            f"{n_frames} frames are declared, but they have no size", offset=WORD_OF_LAST
+        )
     size = shape.frame_size
     if not n_frames and size > max(len(data), MAX_EMPTY_SIZE):
-        raise SourceError(f"no room for a frame, which has {size} bytes", offset=shape.start)
+        raise SourceError(
+            f"the data do not hold even one frame, which has {size} bytes", offset=shape.start
+        )
     shape = replace(shape, n_frames=n_frames, first=_first(data, parameters))
     shape = _with_rotations(data, shape, parameters)
     return replace(shape, notes=tuple(_notes(data, shape, counts, parameters, order)))
@@ -99,7 +103,9 @@ def _candidates(data: bytes, parameters: Parameters) -> Iterator[Shape]:
     starts = [(block - 1) * BLOCK for block in dict.fromkeys(blocks) if block > 1]
     starts = [start for start in starts if start <= len(data)]
     if not starts and (any(points) or any(n for n, _ in analogs)):
-        raise SourceError(f"block {blocks[0]} of the data is not in the file", offset=WORD_OF_START)
+        raise SourceError(
+            f"the data begin at block {blocks[0]}, which is not in the file", offset=WORD_OF_START
+        )
     starts = starts or [len(data)]
     for start, word, n_points, (n, subframes) in product(starts, words or (2, 4), points, analogs):
         yield Shape(start, word, n_points, n, subframes)

@@ -105,7 +105,7 @@ def _check_line_ends(data: bytes) -> None:
         start = data.rfind(b"\n", 0, match.start()) + 1
         if data.count(b'"', start, match.start()) % 2 == 0:
             raise SourceError(
-                "lines end with carriage returns alone; save it with line feeds",
+                "lines end with carriage returns only; save the file with line feeds",
                 line=line_of(data, start),
             )
 
@@ -117,7 +117,7 @@ def write(motion: Motion) -> bytes:
     """
     if motion.source is None or motion.source.format not in NAMES:
         raise MotionError(
-            f"motion {motion.name!r} comes from no CSV file; a table of it is written otherwise"
+            f"motion {motion.name!r} was not read from a CSV file, so it cannot be restored as one"
         )
     return restore_table(motion)
 
@@ -170,7 +170,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     text_cells = [cells.index(text.column) for text in table.texts]
     values = [k for k in range(len(cells)) if cells[k] >= 0 and k not in (time, *text_cells)]
     if not values:
-        raise SourceError("no column of numbers beside the times", line=1)
+        raise SourceError("there is no column of numbers besides the times", line=1)
     at = len(values) + sum(text.n_numbers for text in table.texts)
     timed = time is not None and time not in text_cells
     rows = without_zeros(data, counted_up(table.rows), (range(len(values)), [at] if timed else []))
@@ -214,8 +214,8 @@ def _check_decimals(data: bytes, rows: Rows, n_values: int, labels: Sequence[str
     start, stop = rows.start[:, :n_values][present], rows.stop[:, :n_values][present]
     if b"." not in b"".join(data[a:b] for a, b in zip(start, stop, strict=True)):
         raise SourceError(
-            f"column {labels[0][:40]!r} is text "
-            f"beside integers, without times or frame numbers; a list, and no motion",
+            f"column {labels[0][:40]!r} is text beside integers, without times or frame "
+            "numbers: it looks like a list, not a motion",
             line=line_of(data, int(start.max(initial=0))),
         )
 
@@ -279,7 +279,7 @@ def _rows(data: bytes, head: _Head, time: int | None) -> tuple[TableRows, list[i
         except SourceError:
             if first != FRAME_NUMBER:
                 raise
-    raise SourceError("no column of numbers beside the times", line=1)
+    raise SourceError("there is no column of numbers besides the times", line=1)
 
 
 def _head(data: bytes, encoding: str) -> _Head:
@@ -288,8 +288,8 @@ def _head(data: bytes, encoding: str) -> _Head:
     if row is None:
         if has_decimal_commas(lines):
             raise SourceError(
-                "the first numbers have decimal commas, which no grid prints; "
-                "save the table with points",
+                "the first numbers have decimal commas, which are not supported; save the "
+                "table with decimal points",
                 line=1,
             )
         hint = "no row of numbers in the first lines; no table" if lines else "an empty file"
@@ -301,7 +301,7 @@ def _head(data: bytes, encoding: str) -> _Head:
     heads = [cells for cells in texts[-2:] if len(cells) >= n_cells]
     n_cells = count_columns(heads, data[rows:], separator)
     if n_cells > MAX_COLUMNS:
-        raise SourceError(f"{n_cells} columns, limit {MAX_COLUMNS}", line=number + 1)
+        raise SourceError(f"{n_cells} columns exceed the limit of {MAX_COLUMNS}", line=number + 1)
     units, labels = [""] * n_cells, (0, 0)
     if len(texts) > 1 and len(texts[-2]) >= n_cells and _are_units(texts[-1]):
         units = [unit.strip("[]()") for unit in texts.pop()[:n_cells]]

@@ -235,8 +235,8 @@ def check_points(cells: Sequence[bytes], line: int) -> None:
     for cell in cells:
         if DECIMAL_COMMA.fullmatch(cell):
             raise SourceError(
-                f"{quote(cell)} has a decimal comma, which no grid prints; "
-                f"save the table with points",
+                f"{quote(cell)} has a decimal comma, which is not supported; save the table "
+                "with decimal points",
                 line=line,
             )
 
@@ -251,8 +251,8 @@ def check_names(names: Sequence[str], row: bytes, separator: bytes | None, line:
         return ""
     if separator == b"," and len(cells) == 2 * len(names) and b"." not in row:
         raise SourceError(
-            f"{len(names)} names above {len(cells)} integers, which seem to have "
-            f"decimal commas; save the table with points or with other separators",
+            f"{len(names)} names above {len(cells)} integers, which may have decimal commas; "
+            "save the table with decimal points or with another separator",
             line=line,
         )
     return f"line {line} has {len(names)} names for {len(cells)} columns: no column is named"

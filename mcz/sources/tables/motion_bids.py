@@ -40,7 +40,8 @@ def with_side_files(motion: Motion, path: Path) -> Motion:
         rows = _rows(channels)
         if len(rows) != motion.skeleton.n_channels:
             raise SourceError(
-                f"{len(rows)} channels for the {motion.skeleton.n_channels} columns of {path.name}",
+                f"{len(rows)} channels are listed, but {path.name} has "
+                f"{motion.skeleton.n_channels} columns",
                 path=channels,
             )
         motion = replace(
@@ -93,12 +94,12 @@ def _text(path: Path) -> str:
         with path.open("rb") as file:
             data = file.read(MOST_BYTES + 1)
         if len(data) > MOST_BYTES:
-            raise SourceError(f"a side file of more than {MOST_BYTES} bytes", path=path)
+            raise SourceError(f"the side file exceeds {MOST_BYTES} bytes", path=path)
         return data.decode("utf-8-sig")
     except OSError as error:
         raise SourceError(error.strerror or "cannot be read", path=path) from None
     except UnicodeDecodeError:
-        raise SourceError("a side file that is no UTF-8", path=path) from None
+        raise SourceError("the side file is not UTF-8", path=path) from None
 
 
 def _rows(path: Path) -> list[Mapping[str, str]]:
@@ -107,9 +108,9 @@ def _rows(path: Path) -> list[Mapping[str, str]]:
         lines = _text(path).splitlines()
         rows: list[Mapping[str, str]] = [*csv.DictReader(lines, delimiter="\t", restval="")]
     except csv.Error as error:
-        raise SourceError(f"no table of channels: {error}", path=path) from None
+        raise SourceError(f"not a table of channels: {error}", path=path) from None
     if not all(row.get("name") for row in rows):
-        raise SourceError("a channel without a name", path=path)
+        raise SourceError("a channel has no name", path=path)
     return rows
 
 
@@ -143,9 +144,9 @@ def _rate(path: Path) -> Fraction | None:
         frequency = json.loads(_text(path)).get("SamplingFrequency")
         value = None if frequency is None else float(frequency)
     except (ValueError, TypeError, AttributeError, RecursionError):
-        raise SourceError("no object with a SamplingFrequency in hertz", path=path) from None
+        raise SourceError("not an object with a SamplingFrequency in hertz", path=path) from None
     if value is None:
         return None
     if not LEAST_RATE <= value <= MOST_RATE:
-        raise SourceError(f"a SamplingFrequency of {value:g} Hz", path=path)
+        raise SourceError(f"SamplingFrequency is {value:g} Hz", path=path)
     return Fraction(str(value)).limit_denominator(10**6)

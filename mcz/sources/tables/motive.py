@@ -142,7 +142,7 @@ def _head(data: bytes, encoding: str) -> _Head:
         lines.pop(0)  # of a spreadsheet
     axis = next((k for k, (_, line) in enumerate(lines) if _AXIS.match(line)), None)
     if axis is None or axis < 3:
-        raise SourceError("no line Frame,Time below names; no Motive file", line=len(lines))
+        raise SourceError("no line Frame,Time below names; not a Motive file", line=len(lines))
     if axis + 1 == len(lines) or not begins_with_number(lines[axis + 1][1]):
         at = lines[axis][0]
         raise SourceError("no row of numbers after Frame,Time", line=line_of(data, at) + 1)

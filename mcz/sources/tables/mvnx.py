@@ -74,7 +74,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
     header = read_header(data)
     at, stop = first_frame(data, header.frames), data.rfind(END) + len(END)
     if stop < at:
-        raise SourceError("the first frame does not end; cut off", line=line_of(data, at))
+        raise SourceError("the file is truncated in its first frame", line=line_of(data, at))
     body, rest = data[:stop], data[stop:]
     rows, columns = read_frames(body, at)
     rows = counted_up(followed_by(rows, rest))
@@ -114,7 +114,7 @@ def write(motion: Motion) -> bytes:
     """The MVNX file that ``motion`` was read from, with its values; MotionError for any other."""
     if motion.source is None or motion.source.format != FORMAT:
         raise MotionError(
-            f"motion {motion.name!r} comes from no MVNX file; MVNX of others is not written"
+            f"motion {motion.name!r} was not read from an MVNX file, and cannot be written as one"
         )
     return restore_table(motion)
 

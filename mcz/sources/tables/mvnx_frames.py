@@ -99,14 +99,17 @@ def first_frame(data: bytes, at: int) -> int:
         frame = _FRAME.match(data, at)
         if frame is None:
             raise SourceError(
-                f"no frame of motion: {quote(data[at : at + 40])}", line=line_of(data, at)
+                f"expected a frame of motion, not {quote(data[at : at + 40])}",
+                line=line_of(data, at),
             )
         span = _attributes(data, *frame.span(1)).get(TYPE, (0, 0))
         if data[slice(*span)] in NORMAL:
             return at
         end = data.find(END, at)
         if end < 0:
-            raise SourceError("cut off in a frame of calibration", line=line_of(data, at))
+            raise SourceError(
+                "the file is truncated in a calibration frame", line=line_of(data, at)
+            )
         at = _BLANKS.match(data, end + len(END)).end()  # type: ignore[union-attr]  # nothing, too
 
 
@@ -143,7 +146,7 @@ def _frames(data: bytes, columns: FrameColumns) -> Callable[[int], tuple[list[To
             if len(places) < len(spans):
                 raise _WiderError
             if places and not spans:
-                raise SourceError(f"words in {name!r}, not numbers", line=line_of(data, at))
+                raise SourceError(f"{name!r} contains words, not numbers", line=line_of(data, at))
             tokens += [(*span, place) for span, place in zip(spans, places, strict=False)]
         return tokens, end
 
@@ -157,7 +160,9 @@ def _parts(data: bytes, at: int) -> tuple[list[Part], int]:
     """
     opened = _FRAME.match(data, at)
     if opened is None:
-        raise SourceError(f"no frame: {quote(data[at : at + 40])}", line=line_of(data, at))
+        raise SourceError(
+            f"expected a frame, not {quote(data[at : at + 40])}", line=line_of(data, at)
+        )
     parts: list[Part] = [
         (name, [span])
         for name, span in _attributes(data, *opened.span(1)).items()
@@ -180,9 +185,11 @@ def _parts(data: bytes, at: int) -> tuple[list[Part], int]:
     closed = _CLOSED.match(data, at)
     if closed is None:
         what = quote(data[at : at + 40].lstrip())
-        raise SourceError(f"a frame is elements of text, and not {what}", line=line_of(data, at))
+        raise SourceError(
+            f"a frame must consist of elements with text, not {what}", line=line_of(data, at)
+        )
     if len({name for name, _ in parts}) < len(parts):
-        raise SourceError("a frame has two elements of one name", line=line_of(data, at))
+        raise SourceError("a frame has two elements of the same name", line=line_of(data, at))
     return parts, closed.end()
 
 
@@ -192,7 +199,7 @@ def _attributes(data: bytes, start: int, stop: int) -> dict[str, tuple[int, int]
     for match in _ATTRIBUTE.finditer(data, start, stop):
         name = "@" + match["name"].decode()
         if name in found:
-            raise SourceError("a frame has an attribute twice", line=line_of(data, start))
+            raise SourceError("a frame has the same attribute twice", line=line_of(data, start))
         found[name] = match.span("single" if match["double"] is None else "double")
     return found
 
@@ -223,7 +230,7 @@ def columns_of(sizes: Mapping[str, int], numbered: bool) -> FrameColumns:
     counts = {sizes[name] / len(_KINDS[name]) for name in present}
     if len(counts) != 1 or (n_segments := counts.pop()) % 1:
         found = ", ".join(f"{sizes[name]} numbers of {name}" for name in present) or "neither"
-        raise SourceError(f"positions and orientations of segments expected, found {found}")
+        raise SourceError(f"expected positions and orientations of segments, but found {found}")
     kinds = tuple(kind for name in present for kind in _KINDS[name])
     columns: dict[str, Sequence[int]] = {}
     first = 0
@@ -241,5 +248,5 @@ def columns_of(sizes: Mapping[str, int], numbered: bool) -> FrameColumns:
         columns[name] = range(at, at + sizes[name])
         at += sizes[name]
     if at > MAX_COLUMNS:
-        raise SourceError(f"{at} numbers a frame, limit {MAX_COLUMNS}")
+        raise SourceError(f"{at} numbers a frame exceed the limit of {MAX_COLUMNS}")
     return FrameColumns(columns, kinds, int(n_segments), at)

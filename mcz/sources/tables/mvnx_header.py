@@ -146,19 +146,19 @@ class _Reader:
             return self._header
         more = f" in {len(self._data)} bytes" if len(self._data) == MOST_BYTES else ""
         line = line_of(self._data, len(self._data))
-        raise SourceError(f"no element 'frames'{more}; no MVNX file, or cut off", line=line)
+        raise SourceError(f"no element 'frames'{more}; not an MVNX file, or truncated", line=line)
 
     def _refuse_types(self, *_: object) -> None:
         line = self._parser.CurrentLineNumber
-        raise SourceError("a declaration of types (DOCTYPE), which is not read", line=line)
+        raise SourceError("it declares types (DOCTYPE), which is not supported", line=line)
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         header, path = self._header, self._path
         if not path and name != ROOT:
-            raise SourceError(f"element {name[:40]!r}, expected {ROOT!r}; no MVNX file", line=1)
+            raise SourceError(f"element {name[:40]!r}, expected {ROOT!r}; not an MVNX file", line=1)
         if len(path) == MOST_DEPTH:
             line = self._parser.CurrentLineNumber
-            raise SourceError(f"elements in more than {MOST_DEPTH} others", line=line)
+            raise SourceError(f"elements are nested more than {MOST_DEPTH} deep", line=line)
         label = attributes.get("label", "")
         if name == "frames":
             header.frames = self._parser.CurrentByteIndex

@@ -103,7 +103,7 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
 def _header(data: bytes) -> _Header:
     end = _END.search(data)
     if end is None:
-        raise SourceError("no line 'endheader'; not a STO or MOT file, or cut off", line=1)
+        raise SourceError("no line 'endheader'; not an STO or MOT file, or truncated", line=1)
     values: dict[str, str] = {}
     count = (0, 0)
     for at, line in lines_from(data[: end.start()], 0):
@@ -124,7 +124,9 @@ def _header(data: bytes) -> _Header:
             if labels is None:
                 break
             return _Header(values, count, labels, at)
-    raise SourceError("no names and row of numbers after endheader", line=line_of(data, end.end()))
+    raise SourceError(
+        "names and a row of numbers must follow endheader", line=line_of(data, end.end())
+    )
 
 
 def _columns(
@@ -142,7 +144,8 @@ def _columns(
     sizes = [cell.count(b",") + 1 for cell in cells]
     if max(sizes) > MAX_PARTS or sizes[0] != 1:
         raise SourceError(
-            f"{max(sizes)} numbers in a cell, limit {MAX_PARTS}, and one in the first",
+            f"{max(sizes)} numbers in a cell exceed the limit of {MAX_PARTS}, or the first "
+            "cell does not have one",
             line=line_of(data, header.rows),
         )
     usual = max(set(sizes[1:]), key=sizes[1:].count, default=1)

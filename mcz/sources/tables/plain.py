@@ -92,7 +92,9 @@ def _times(motion: Motion) -> tuple[Clock | None, tuple[Signal, ...]]:
     """The clock that prints the times of ``motion``, or a signal of them."""
     timeline = motion.timeline
     if timeline is None:
-        raise MotionError("its frame rate is unknown; a table has times", clip=motion.name)
+        raise MotionError(
+            "its frame rate is unknown, but a table must state times", clip=motion.name
+        )
     times = timeline.times
     noise = TOLERANCE + float(np.spacing(np.abs(times).max(initial=0.0)))
     exact = (np.abs(np.round(times, DECIMALS) - times) < noise).all()
@@ -122,7 +124,9 @@ def _clock(motion: Motion, timeline: Timeline, grid: Grid) -> Clock | None:
 
 def _rate(motion: Motion) -> Fraction:
     if motion.frame_rate is None:
-        raise MotionError("its frame rate is unknown; a table has times", clip=motion.name)
+        raise MotionError(
+            "its frame rate is unknown, but a table must state times", clip=motion.name
+        )
     return motion.frame_rate
 
 
@@ -132,7 +136,7 @@ def _names(names: Sequence[str], n_frames: int) -> list[str]:
         if not name or name != name.strip() or any(ord(character) < 32 for character in name):
             raise MotionError(f"a table cannot hold the name {name!r}")
     if not n_frames:
-        raise MotionError("no rows of numbers")
+        raise MotionError("there are no rows of numbers")
     return list(names)
 
 

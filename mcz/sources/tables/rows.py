@@ -116,7 +116,7 @@ class RowCells:
         n_parts = self.data.count(_PART, start, stop) + 1
         if n_parts != len(columns):
             raise SourceError(
-                f"{n_parts} numbers in a cell, expected {len(columns)}",
+                f"{n_parts} numbers in a cell; expected {len(columns)}",
                 line=line_of(self.data, start),
             )
         parts = self.data[start:stop].split(_PART)
@@ -169,7 +169,7 @@ def read_table(
 
     rows = attempt(True)
     if not rows.n_rows:
-        raise SourceError("no row of numbers", line=line_of(data, min(at, len(data))))
+        raise SourceError("there is no row of numbers", line=line_of(data, min(at, len(data))))
     blank = (rows.stop > 0) & (rows.start == rows.stop)
     odd = odd_cells(data, rows)
     texts = odd.text_columns() if numbers_at is not None else []

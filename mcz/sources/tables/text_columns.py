@@ -151,8 +151,8 @@ def split_text(
     if len(layouts) > MAX_PATTERNS:
         most = max(zip(columns, shapes, strict=True), key=lambda entry: len(entry[1][1]))[0]
         raise SourceError(
-            f"the texts of column "
-            f"{columns[most]} differ in more than {MAX_PATTERNS} ways apart from their digits",
+            f"the texts of column {columns[most]} follow more than {MAX_PATTERNS} patterns "
+            "(digits aside)",
             line=line_of(data, int(rows.start[:, most].max())),
         )
     of_row = of_row.ravel()

@@ -84,7 +84,7 @@ def _header(data: bytes) -> _Header:
     labels = next((k for k, (_, line) in enumerate(lines[:64]) if _LABELS.match(line)), None)
     if labels is None:
         raise SourceError(
-            "no line that begins with Frame#; no TRC file, or cut off", line=min(len(lines), 4)
+            "no line begins with Frame#; not a TRC file, or truncated", line=min(len(lines), 4)
         )
     values, count = {}, (0, 0)
     if keys is not None and keys + 1 < labels:
@@ -99,7 +99,7 @@ def _header(data: bytes) -> _Header:
         if begins_with_number(line):
             start = lines[labels][0]
             return _Header(values, count, (start, start + len(lines[labels][1])), at)
-    raise SourceError("no row of numbers after the names of the markers", line=labels + 2)
+    raise SourceError("no row of numbers follows the marker names", line=labels + 2)
 
 
 def _labels(line: bytes, encoding: str) -> list[str]:

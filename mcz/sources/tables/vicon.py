@@ -135,14 +135,12 @@ def _parts(data: bytes, encoding: str) -> list[_Part]:
             raise SourceError("no row of numbers below Frame,Sub Frame", line=line_of(data, end))
         stop = _END.search(data, rows)
         if len(parts) == MAX_SECTIONS:
-            raise SourceError(
-                f"more sections than {MAX_SECTIONS}, the limit", line=line_of(data, end)
-            )
+            raise SourceError(f"more than {MAX_SECTIONS} sections", line=line_of(data, end))
         lines = (match[1], match.start(), match.end(), rows)
         parts.append(_part(data, at, lines, stop.start() if stop else len(data), encoding))
         at = parts[-1].stop
     if not parts:
-        raise SourceError("no line that begins with Frame,Sub Frame; no file of Vicon", line=1)
+        raise SourceError("no line begins with Frame,Sub Frame; not a Vicon file", line=1)
     return parts
 
 
@@ -194,8 +192,8 @@ def _read(data: bytes, part: _Part) -> _Read:
     )
     if not counted:
         raise SourceError(
-            f"section {part.title[:40]!r}: its {rows.n_rows} rows "
-            f"are not as many a frame in all frames",
+            f"section {part.title[:40]!r}: its {rows.n_rows} rows are not the same number in "
+            "every frame",
             line=line_of(data, part.rows),
         )
     rows = counted_up(rows, n_each)
@@ -238,8 +236,8 @@ def _check_frames(data: bytes, one: _Read, numbers: Ints) -> None:
     own = one.numbers[:: one.n_each]
     if not np.array_equal(own, numbers):
         raise SourceError(
-            f"section {one.part.title[:40]!r} has "
-            f"{len(own)} frames from {own[0]} on, another {len(numbers)} from {numbers[0]} on",
+            f"section {one.part.title[:40]!r} has {len(own)} frames from {own[0]} on, but "
+            f"another has {len(numbers)} from {numbers[0]} on",
             line=line_of(data, one.part.rows),
         )
 

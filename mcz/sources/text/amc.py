@@ -58,7 +58,7 @@ def read(data: bytes, name: str = "motion", skeleton: Skeleton | None = None) ->
     check_first_line(data, HARMLESS)
     match = _FIRST_FRAME.search(data)
     if match is None:
-        raise SourceError("no line with a frame number; not an AMC file, or without frames")
+        raise SourceError("no line with a frame number; not an AMC file, or it has no frames")
     begin = match.start()
     encoding = text_encoding(data)
     try:
@@ -86,7 +86,7 @@ def _read_frames(
     """The skeleton that fits the bones, and all frames."""
     counts = {bone.decode(encoding): count for bone, count in frames.counts.items()}
     if len(counts) < len(frames.counts):
-        raise SourceError("two bones of one name")
+        raise SourceError("two bones have the same name")
     unit = _unit(data[:begin])
     if skeleton is None:
         fitted, columns = flat(counts, unit)
@@ -126,9 +126,9 @@ class _Frames:
                 tokens.append((start, stop, FRAME_NUMBER))
             else:
                 if not tokens:
-                    raise self._error(start, f"{quote(words[0][0])}, not a frame number")
+                    raise self._error(start, f"expected a frame number, not {quote(words[0][0])}")
                 if words[0][0] in seen:
-                    raise self._error(start, f"bone {quote(words[0][0])} twice in a frame")
+                    raise self._error(start, f"bone {quote(words[0][0])} occurs twice in a frame")
                 seen.add(words[0][0])
                 tokens += self._bone(words)
             end = words[-1].end()
@@ -141,7 +141,7 @@ class _Frames:
         if count != self.counts[bone]:
             raise self._error(
                 words[0].start(),
-                f"{count} values for bone {quote(bone)}, which has {self.counts[bone]} elsewhere",
+                f"{count} values for bone {quote(bone)}, but {self.counts[bone]} elsewhere",
             )
         column = self.columns[bone]
         return [(*word.span(), column + k) for k, word in enumerate(words[1:])]
@@ -176,11 +176,11 @@ def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving
     skeleton, and for bones that do not fit it or come late.
     """
     if skeleton is None:
-        raise SourceError("an AMC that comes line by line needs its skeleton")
+        raise SourceError("an AMC read line by line needs its skeleton")
     source = Lines(lines)
     header, number = _header(source)
     if number is None:
-        raise SourceError("no line with a frame number; not an AMC file, or without frames")
+        raise SourceError("no line with a frame number; not an AMC file, or it has no frames")
     frames = _ArrivingFrames(source, header, skeleton)
     rows = frames.rows(number)
     first = list(islice(rows, 1))
@@ -242,13 +242,13 @@ class _ArrivingFrames:
     def _add(self, bones: dict[str, list[bytes]], words: list[bytes], done: bool) -> None:
         name = words[0].decode("utf-8", "backslashreplace")
         if name in bones:
-            raise self.source.error(f"bone {quote(name)} twice in a frame")
+            raise self.source.error(f"bone {quote(name)} occurs twice in a frame")
         count = None if self._counts is None else self._counts.get(name)
         if done or (self._counts is not None and count is None):
-            raise self.source.error(f"bone {quote(name)}, which the first frame does not have")
+            raise self.source.error(f"bone {quote(name)} is not in the first frame")
         if count is not None and count != len(words) - 1:
             raise self.source.error(
-                f"{len(words) - 1} values for bone {quote(name)}, which has {count} elsewhere"
+                f"{len(words) - 1} values for bone {quote(name)}, but {count} elsewhere"
             )
         bones[name] = words[1:]
 
@@ -333,9 +333,9 @@ def _plain_source(motion: Motion) -> Source:
             valid = mask[:, columns.start : columns.stop]
             present[:, index] = valid.all(axis=1)
             if (valid.any(axis=1) != present[:, index]).any():
-                raise MotionError(f"AMC cannot leave out a part of joint {joint.name!r}")
+                raise MotionError(f"AMC cannot omit some channels of joint {joint.name!r}")
     if len(set(skeleton.addresses())) != len({joint.name for joint in skeleton.joints}):
-        raise MotionError("AMC needs joint names that differ")
+        raise MotionError("AMC needs unique joint names")
     unit = "RADIANS" if skeleton.angle_unit == "rad" else "DEGREES"
     if not motion.n_frames:
         return _source(unit, (), None)

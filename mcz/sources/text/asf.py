@@ -118,7 +118,7 @@ def _check_joints(skeleton: Skeleton) -> tuple[Joint, ...]:
         raise MotionError("ASF needs a first joint 'root' without tails, and fixed rotation axes")
     names = {joint.name for joint in joints}
     if len(names) < len(joints):
-        raise MotionError("ASF needs joint names that differ")
+        raise MotionError("ASF needs unique joint names")
     for joint in joints:
         if WORDS.fullmatch(joint.name) is None or joint.name[0] in "#:":
             raise MotionError(f"ASF cannot hold the joint name {joint.name!r}")
@@ -191,7 +191,7 @@ class _Reader:
         elif key == "angle":
             self.angle = words[1].lower()[:3] if len(words) > 1 else ""
             if self.angle not in ("deg", "rad"):
-                raise SourceError(f"angle unit {' '.join(words[1:])!r}")
+                raise SourceError(f"angle unit {' '.join(words[1:])!r} is invalid")
 
     def _root(self, key: str, words: list[str]) -> None:
         if key == "order":
@@ -209,10 +209,10 @@ class _Reader:
             return
         bone = self.bone
         if bone is None:
-            raise SourceError(f"{words[0][:40]!r} outside of begin and end")
+            raise SourceError(f"{words[0][:40]!r} is outside of begin and end")
         if key == "end":
             if not bone.name or bone.name in self.bones or bone.name == "root":
-                raise SourceError(f"a bone without a name of its own: {bone.name!r}")
+                raise SourceError(f"a bone needs a unique name, not {bone.name!r}")
             self.bones[bone.name] = bone
             check("bones", len(self.bones), MOST_JOINTS - 1)
             self.bone = None
@@ -235,7 +235,7 @@ def _number(words: list[str]) -> float:
         number = float("nan")
     # float also takes 1_0, digits of other scripts, and blanks of Unicode around them.
     if not isfinite(number) or "_" in words[0] or not words[0].isascii():
-        raise SourceError(f"{' '.join(words)[:40]!r}, where a number was expected")
+        raise SourceError(f"expected a number, not {' '.join(words)[:40]!r}")
     return number
 
 
@@ -247,7 +247,7 @@ def _vector(words: list[str]) -> Vector:
 def _order(words: list[str]) -> str:
     order = words[0].upper() if words else "XYZ"
     if sorted(order) != ["X", "Y", "Z"]:
-        raise SourceError(f"axis order {order[:40]!r}")
+        raise SourceError(f"axis order {order[:40]!r} is invalid")
     return order
 
 
@@ -286,7 +286,7 @@ def _joints(reader: _Reader) -> tuple[Joint, ...]:
     for parent, child in reader.links:
         bone = reader.bones.get(child)
         if bone is None or (parent != "root" and parent not in reader.bones):
-            raise SourceError(f"hierarchy: {parent} {child}: no such bone")
+            raise SourceError(f"hierarchy: {parent} {child}: no bone has this name")
         if bone.parent is not None:
             raise SourceError(
                 f"hierarchy: bone {child} has two parents, {bone.parent} and {parent}"
@@ -325,7 +325,7 @@ def _parents_first(bones: list[_Bone]) -> list[_Bone]:
             placed.add(bone.name)
             ready += reversed(waiting.pop(bone.name, []))
     if waiting:
-        raise SourceError(f"hierarchy: {', '.join(list(waiting)[:8])}: a circle of bones")
+        raise SourceError(f"hierarchy: these bones form a cycle: {', '.join(list(waiting)[:8])}")
     return result
 
 

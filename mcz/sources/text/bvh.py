@@ -124,10 +124,10 @@ def _motion_section(
     """Find the frame count, the frame time and the first frame."""
     frames = _FRAMES.match(data, at)
     if frames is None:
-        raise SourceError("no 'Frames:' after MOTION", line=line_of(data, at))
+        raise SourceError("'Frames:' must follow MOTION", line=line_of(data, at))
     time = _FRAME_TIME.match(data, frames.end())
     if time is None:
-        raise SourceError("no 'Frame Time:' after 'Frames:'", line=line_of(data, frames.end()))
+        raise SourceError("'Frame Time:' must follow 'Frames:'", line=line_of(data, frames.end()))
     blanks = _BLANKS.match(data, time.end())
     stop = blanks.end() if blanks else time.end()
     if n_columns and stop < len(data):
@@ -209,7 +209,7 @@ def _plain_source(motion: Motion) -> Source:
     """The source of a file in one plain style."""
     mask = motion.signals[0].mask
     if mask is not None and not mask.all():
-        raise MotionError("BVH cannot leave out values, and some are invalid")
+        raise MotionError("BVH cannot omit values, but some are invalid")
     text, order = write_hierarchy(motion.skeleton)
     columns = [column for joint in order for column in motion.skeleton.columns(joint)]
     runs = runs_of([(b" " if k else b"", column, 0) for k, column in enumerate(columns)])

@@ -72,7 +72,7 @@ class _Reader:
     def read(self) -> None:
         """Read up to and including the word MOTION."""
         if self.word().upper() != b"HIERARCHY":
-            raise self.error("no HIERARCHY section at the start; not a BVH file, or half of one")
+            raise self.error("no HIERARCHY section at the start; not a BVH file, or a part of one")
         open_nodes: list[tuple[int, _Node]] = []  # with the joint's index, or its parent's
         while (word := self.word().upper()) != b"MOTION" or open_nodes:
             if word in (b"ROOT", b"JOINT", b"END"):
@@ -105,7 +105,7 @@ class _Reader:
         self.at = rest.end()
         node = _Node(rest[0].strip(BLANKS), parent, word == b"END")
         if self.word() != b"{":
-            raise self.error(f"no {{ after {word.decode()} {quote(node.name)}")
+            raise self.error(f"expected {{ after {word.decode()} {quote(node.name)}")
         if node.end:
             return parent, node
         self.joints.append(node)
@@ -123,13 +123,13 @@ class _Reader:
         except ValueError:
             number = float("nan")
         if not isfinite(number) or b"_" in word:
-            raise self.error(f"{quote(word)}, where a number was expected")
+            raise self.error(f"expected a number, not {quote(word)}")
         return number
 
     def _channels(self) -> Iterator[Channel]:
         count = self.word()
         if not count.isdigit() or len(count) > 9:
-            raise self.error(f"CHANNELS {quote(count)}: not a count")
+            raise self.error(f"CHANNELS {quote(count)} is not a count")
         for k in range(int(count)):
             word = self.word()
             known = word.upper() in (
@@ -147,7 +147,7 @@ class _Reader:
             yield channel(word.decode("latin-1"))
         after = self.at
         if channel(self.word().decode("latin-1")).kind:
-            raise self.error(f"CHANNELS {int(count)}, but more are named")
+            raise self.error(f"CHANNELS {int(count)}, but more channels are named")
         self.at = after
 
 
@@ -253,11 +253,13 @@ def _check(skeleton: Skeleton, joint: Joint) -> None:
     if any(letter in name for letter in "\n{") or name != name.strip(BLANKS.decode()):
         raise MotionError(f"BVH cannot hold the joint name {name!r}")
     if any(joint.axis):
-        raise MotionError(f"BVH has no axis, as joint {name!r} has: {joint.axis}")
+        raise MotionError(f"BVH cannot hold the rotation axis {joint.axis} of joint {name!r}")
     for c in joint.channels:
         word = _NAMES.get(c.kind, c.name)
         if channel(word) != c or _WORD.fullmatch(word.encode()) is None:
             raise MotionError(f"BVH cannot hold channel {c.label!r} of joint {name!r}")
     turns = sum(c.kind in ("rx", "ry", "rz") for c in joint.channels)
     if (turns and skeleton.angle_unit == "rad") or (turns > 1 and not skeleton.intrinsic):
-        raise MotionError(f"BVH rotates in degrees about turned axes; joint {name!r} does not")
+        raise MotionError(
+            f"BVH needs intrinsic rotations in degrees, which joint {name!r} does not have"
+        )

@@ -178,7 +178,7 @@ class Numbered(NamedTuple):
 def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[Numbered, Numbered]:
     """Gaps and patterns of a template and of a detail; LimitError for too many runs."""
     if sum(len(pattern.runs) for pattern in patterns) > MAX_RUNS:
-        raise LimitError(f"the frames are laid out in more than {MAX_RUNS} runs of columns")
+        raise LimitError(f"the frames have more than {MAX_RUNS} runs of columns")
     gaps: dict[bytes, int] = {}
     fields = []
     n_shared = 0

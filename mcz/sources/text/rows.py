@@ -181,8 +181,8 @@ class _Reader:
         most = self._most_rows()
         if self.row + 2 > most:
             raise SourceError(
-                f"frame {self.row}: most of the {self.n_columns} channels are missing from most "
-                f"frames; a table of all of them would dwarf the file"
+                f"frame {self.row}: most of the {self.n_columns} channels are missing from "
+                "most frames, so a table would be far larger than the file"
             )
         expected = int((self.row + 1) * size / max(1, done) * 1.01) + 64
         n_rows = max(min(expected, 4 * len(self.numbers)), len(self.numbers) * 3 // 2)
@@ -243,8 +243,8 @@ class _Reader:
         pattern = Pattern(runs_of(items), tail)
         if number >= MAX_PATTERNS or pattern.gap_size > MAX_ROW_GAPS:
             raise SourceError(
-                f"the layout is too irregular: more than "
-                f"{MAX_PATTERNS} layouts of a frame, or {MAX_ROW_GAPS} bytes beside its numbers",
+                f"the layout is too irregular: frames follow more than {MAX_PATTERNS} "
+                f"layouts, or have more than {MAX_ROW_GAPS} bytes besides their numbers",
                 line=line_of(self.data, at),
             )
         self.patterns.append(pattern)
@@ -256,7 +256,9 @@ class _Reader:
     def _number(self, token: bytes) -> None:
         number = int(token) if FRAME_NUMBER_TEXT.fullmatch(token) else MAX_NUMBER
         if abs(number) >= MAX_NUMBER:
-            raise SourceError(f"frame {self.row}: {quote(token)} is no frame number or too large")
+            raise SourceError(
+                f"frame {self.row}: {quote(token)} is not a frame number, or too large"
+            )
         self.numbers[self.row] = number
         if token != b"%d" % number:
             self.number_texts.append((self.row, token))

@@ -68,7 +68,7 @@ def check_first_line(data: bytes, ignored: tuple[bytes, ...]) -> None:
     line = data[len(BOM) :].split(b"\n", 1)[0].strip().lower()
     if data.startswith(BOM) and line and not line.startswith(ignored):
         raise SourceError(
-            f"a byte order mark of UTF-8 hides {quote(line)}; save the file without it", line=1
+            f"a UTF-8 byte order mark precedes {quote(line)}; save the file without it", line=1
         )
 
 
@@ -93,7 +93,7 @@ MOST_DEPTH = 4096
 def check(what: str, number: int, most: int) -> None:
     """Raise SourceError where a skeleton has more than it may have of ``what``."""
     if number > most:
-        raise SourceError(f"more than {most:,} {what}; no skeleton is stored with as many")
+        raise SourceError(f"more than {most:,} {what}, the limit of a stored skeleton")
 
 
 Floats = NDArray[np.float64]

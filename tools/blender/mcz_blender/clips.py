@@ -95,7 +95,7 @@ def _from_source(path: str, wanted: Wanted) -> Loaded:
 def _range(n_frames: int, wanted: Wanted, name: str) -> tuple[int, int]:
     stop = wanted.stop or n_frames
     if not 0 <= wanted.first < stop <= n_frames and n_frames:
-        raise mcz.OptionError(f"{name!r} has frames 0 to {n_frames}, not {wanted.first}:{stop}")
+        raise mcz.OptionError(f"{name!r} has {n_frames} frames, not {wanted.first}:{stop}")
     return wanted.first, stop
 
 

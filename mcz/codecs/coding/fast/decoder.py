@@ -65,7 +65,9 @@ class Shape:
         result = self._known.get(groups)
         if result is None:
             if (most := max(groups, default=0)) >= max(1, len(self.groups)):  # FAST-27, FAST-34
-                raise FormatError(f"fast: group {most} of {len(self.groups)}")
+                raise FormatError(
+                    f"fast: group {most} does not exist; there are {len(self.groups)}"
+                )
             channels = np.array([c for group in groups for c in self.groups[group]], np.int64)
             firsts = np.cumsum([0, *(len(self.groups[group]) for group in groups)])
             places = np.full(len(self.groups), -1)
@@ -122,7 +124,9 @@ class Heads:
 def check_size(n_rows: int, n_channels: int, n_frames: int) -> None:
     """Raise FormatError for a segment that is larger than any."""
     if (n_rows > MOST_ROWS and n_frames > 1) or n_rows * n_channels > MOST_VALUES:
-        raise FormatError(f"fast: a segment of {n_rows} rows and {n_channels} channels")  # FAST-18
+        raise FormatError(
+            f"fast: a segment of {n_rows} rows and {n_channels} channels is too large"
+        )  # FAST-18
 
 
 def read_heads(shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int) -> Heads:

@@ -79,8 +79,8 @@ def _read_compiled(lanes: Lanes) -> None:
 def fault_of(part: str, unit: str, fault: int) -> FormatError:
     """The error of ``read_leads`` or ``read_ordinals``."""
     if fault < -1:
-        return FormatError(f"fast: bits are left in the {part}, group {-2 - fault} of those read")
-    return FormatError(f"fast: {unit} {fault} of the {part} has no code")
+        return FormatError(f"fast: unused bits in the {part}, group {-2 - fault} of those read")
+    return FormatError(f"fast: {unit} {fault} of the {part} is not a valid code")
 
 
 @dataclass(slots=True)
@@ -108,7 +108,7 @@ class Streams:
         left = self.ends - self.bits
         rest = self.words(len(left)) & MASKS[np.clip(left, 0, 63)]
         if ((left < 0) | (left > 7) | (rest != 0)).any():  # FAST-20
-            raise FormatError(f"fast: bits are left in the {part}")
+            raise FormatError(f"fast: unused or missing bits in the {part}")
 
     def longer(self, n_rows: int) -> Streams:
         """Streams of segments with more rows."""

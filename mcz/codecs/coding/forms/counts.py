@@ -56,16 +56,16 @@ class Law:
 def parse_law(stream: bytes, at: int, unit: float) -> tuple[Law, bool, int]:
     """The law whose ``parts`` are at an offset, whether there are rests, the offset after it."""
     if at >= len(stream) or stream[at] > OFFSET | SHIFT | RESTS:  # FAST-52
-        raise FormatError(f"parts {stream[at : at + 1].hex() or 'missing'} of a law")
+        raise FormatError(f"the parts of a law are {stream[at : at + 1].hex() or 'missing'}")
     parts, at = stream[at], at + 1
     terms: list[float | None] = [None, None]
     for place, bit in enumerate((OFFSET, SHIFT)):
         if parts & bit:
             if at + 8 > len(stream):
-                raise FormatError(f"the stream ends at {len(stream)}, in a law")
+                raise FormatError(f"the stream is truncated at {len(stream)}, within a law")
             (term,) = struct.unpack_from("<d", stream, at)
             if not -MOST_OFFSET <= term <= MOST_OFFSET:  # FAST-53
-                raise FormatError(f"an offset or shift of {term!r}")
+                raise FormatError(f"offset or shift {term!r} is out of range")
             terms[place], at = term, at + 8
     return Law(unit, *terms), bool(parts & RESTS), at
 

@@ -93,21 +93,21 @@ def parse_mapping(
         law, rests, at = parse_law(stream, at, unit)
         return partial(law.ordinals, grid=unit_grid(grid)), rests, at
     if grid.kind != GridKind.GENERAL:  # FAST-49
-        raise FormatError(f"form {form} on the grid {grid.kind.name}")
+        raise FormatError(f"form {form} is not allowed on a {grid.kind.name} grid")
     if at >= len(stream):
-        raise FormatError(f"the stream ends at {at}, before the shifts of a unit")
+        raise FormatError(f"the stream is truncated at {at}, before the shifts of a unit")
     shifts, at = stream[at], at + 1
     if not 1 <= shifts <= MAX_SHIFTS:  # FAST-50
-        raise FormatError(f"form {form}: {shifts} shifts")
+        raise FormatError(f"form {form}: the number of shifts is {shifts}")
     return partial(of_products, unit=unit, shifts=shifts, grid=grid), False, at
 
 
 def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
     if at + 8 > len(stream):
-        raise FormatError(f"the stream ends at {len(stream)}, in a unit")
+        raise FormatError(f"the stream is truncated at {len(stream)}, within a unit")
     (unit,) = struct.unpack_from("<d", stream, at)
     if not 2.0**-200 <= unit <= 2.0**80:  # FAST-47
-        raise FormatError(f"a unit of {unit!r}")
+        raise FormatError(f"unit {unit!r} is out of range")
     return unit, at + 8
 
 

@@ -62,16 +62,16 @@ def to_scene(
 ) -> SceneFile:
     """``motion`` as a file of the format ``to``, "glb" or "usda"; see those functions."""
     if to not in WRITERS:
-        raise OptionError(f"no scene as {to!r}, but as {', '.join(WRITERS)}")
+        raise OptionError(f"unknown scene format {to!r}; the formats are {', '.join(WRITERS)}")
     motion = SourceOptions(rate=rate, unit=unit, up=up).applied_to(motion)
     if motion.timeline is None:
         raise OptionError(
-            f"its frame rate is unknown, and {to.upper()} states times",
+            f"its frame rate is unknown, but {to.upper()} must state times",
             clip=motion.name,
             hint=Hint.RATE,
         )
     if to == "usda" and key_error_mm:
-        raise OptionError("USD has a sample in every frame: a key error is for GLB")
+        raise OptionError("a key error applies only to GLB; USD has a sample in every frame")
     scene = scene_of(motion)
     _check_size(scene)
     bound = 0.0 if to == "usda" else _bound(scene, key_error_mm)
@@ -144,7 +144,7 @@ def _bound(scene: Scene, key_error_mm: float | None) -> float:
     if key_error_mm is None:
         return KEY_ERROR_MM / MM_PER_M if scene.has_unit else KEY_ERROR_SIZE * scene.size
     if not 0 <= key_error_mm < np.inf:
-        raise OptionError(f"a key error of {key_error_mm} mm: a length of at least 0")
+        raise OptionError(f"key error is {key_error_mm} mm; it must be at least 0")
     if key_error_mm and not scene.has_unit:
         raise OptionError(
             f"its length unit is unknown, so a key error of {key_error_mm:g} mm has no meaning",
@@ -158,4 +158,4 @@ def _check_size(scene: Scene) -> None:
     for node in scene.nodes:
         places: Any = np.abs(node.places[node.is_visible])
         if not (places < GREATEST).all() or not (np.abs(node.rest) < GREATEST).all():
-            raise MotionError(f"node {node.name!r} is farther away than float32 numbers reach")
+            raise MotionError(f"node {node.name!r} is too far away for float32")

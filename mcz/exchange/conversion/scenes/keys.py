@@ -132,8 +132,8 @@ class _Keyer:
                 break
             if number > ROUNDS:
                 raise OptionError(
-                    f"float32 numbers alone are {errors.max():.2g} m "
-                    f"off, and the keys may be {self.bound:.2g} m off",
+                    f"rounding to float32 alone causes an error of {errors.max():.2g} m, but "
+                    f"at most {self.bound:.2g} m is allowed",
                     clip=self.scene.name,
                     hint=Hint.KEY_ERROR,
                 )

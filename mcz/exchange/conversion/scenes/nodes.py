@@ -112,7 +112,7 @@ def scene_of(motion: Motion) -> Scene:
     rate = _rate(motion, timeline)
     check_poses(motion.name, motion.signals[0])
     if not skeleton.joints:
-        raise MotionError("a skeleton without joints makes no scene", clip=motion.name)
+        raise MotionError("a scene needs at least one joint", clip=motion.name)
     scale = 1.0 if skeleton.unit_cm is None else skeleton.unit_cm / CM_PER_M
     is_markers = point_set(skeleton) == "markers"
     nodes = tuple(_markers(motion, scale) if is_markers else _joints(motion, scale))
@@ -143,8 +143,8 @@ def _times(name: str, timeline: Timeline, rate: Fraction) -> Floats:
     seconds = (even - even[:1]).astype(np.float32).astype(np.float64)
     if (np.diff(seconds) <= 0).any() or not np.isfinite(seconds).all():
         raise MotionError(
-            f"{len(seconds)} frames at {float(rate):g} a second have "
-            "times that float32 cannot tell apart",
+            f"float32 cannot distinguish the times of {len(seconds)} frames at "
+            f"{float(rate):g} a second",
             clip=name,
             hint=Hint.FRAMES,
         )
@@ -194,7 +194,7 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
     skeleton, values = motion.skeleton, np.asarray(motion.values, np.float64)
     used = [column for column, channel in enumerate(skeleton.channels) if channel.kind]
     if gap := first_gap(motion, used):
-        raise MotionError(f"joints cannot be left out of frames, but {gap}", clip=motion.name)
+        raise MotionError(f"a scene cannot omit joints in some frames, but {gap}", clip=motion.name)
     placed = _Placements(motion, values, scale)
     names = skeleton.addresses()
     starts = accumulate((1 + len(tails) for tails in placed.tails), initial=0)
@@ -266,7 +266,7 @@ def _turns(motion: Motion, values: Floats, index: int) -> Floats | None:
     matrices = frame_poses_of(motion.skeleton).local(values, [index])
     if not np.isfinite(matrices).all():
         name = motion.skeleton.addresses()[index]
-        raise MotionError(f"joint {name!r}: a quaternion of length 0 turns nothing")
+        raise MotionError(f"joint {name!r}: a quaternion of length 0 is no rotation")
     return np.roll(from_matrices(matrices, "quat")[:, 0], -1, axis=1)
 
 
