@@ -33,7 +33,7 @@ class Settings:
         rounded = round(setting) if self.whole else float(f"{setting:.6g}")
         return float(min(max(rounded, self.low), self.high))
 
-    def given(self, setting: float) -> float | int:
+    def to_parameter(self, setting: float) -> float | int:
         return int(setting) if self.whole else setting
 
 
@@ -54,10 +54,10 @@ def sweep(case: Case, variant: Variant, n_points: int = N_POINTS) -> list[Record
     plain = 4.0 * max(1, signal.values.size)
 
     def size(setting: float) -> float:
-        return coded_bytes(case, variant, {dial.parameter: settings.given(setting)})
+        return coded_bytes(case, variant, {dial.parameter: settings.to_parameter(setting)})
 
     points = ladder(size, settings, (plain / FINEST, plain / COARSEST), n_points)
-    return [measure(case, variant, {dial.parameter: settings.given(s)}) for s in points]
+    return [measure(case, variant, {dial.parameter: settings.to_parameter(s)}) for s in points]
 
 
 def ladder(

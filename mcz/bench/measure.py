@@ -114,19 +114,19 @@ def speeds(case: Case, variant: Variant, params: Params) -> Record:
     """
     loaded = load(case)
     motion = coded_part(loaded.motion, variant.codec)
-    given = variant.options(params)
-    encode, decode = codec_calls(motion, variant.codec, given)
+    to_parameter = variant.options(params)
+    encode, decode = codec_calls(motion, variant.codec, to_parameter)
 
     def read() -> object:
         with mcz.open(data, max_decoded=2**53) as file:
             return file.only_clip().read()
 
-    data = write_file(motion, variant.codec, given)
+    data = write_file(motion, variant.codec, to_parameter)
     seconds = {
         "parse": cpu_seconds(lambda: mcz.read(case.path, unit=case.unit)),
         "encode": cpu_seconds(encode),
         "decode": cpu_seconds(decode),
-        "write": cpu_seconds(lambda: write_file(motion, variant.codec, given)),
+        "write": cpu_seconds(lambda: write_file(motion, variant.codec, to_parameter)),
         "read": cpu_seconds(read),
     }
     fps = {f"{name}_fps": motion.n_frames / took for name, took in seconds.items()}

@@ -32,21 +32,21 @@ class Table:
             "rows": [list(row) for row in self.rows],
         }
 
-    def kept(self) -> JsonObject:
+    def to_cache(self) -> JsonObject:
         """Everything, for the cache."""
         return self.document() | {"columns": [list(pair) for pair in self.columns]}
 
     @classmethod
-    def of(cls, kept: JsonObject) -> Table:
-        """The inverse of ``kept``."""
-        columns = tuple((head, spec) for head, spec in kept["columns"])
-        return cls(kept["title"], kept["caption"], columns, kept["rows"])
+    def from_cache(cls, cached: JsonObject) -> Table:
+        """The inverse of ``to_cache``."""
+        columns = tuple((head, spec) for head, spec in cached["columns"])
+        return cls(cached["title"], cached["caption"], columns, cached["rows"])
 
     def cells(self) -> list[list[str]]:
         """Headings, then rows, as text."""
         formats = [spec for _, spec in self.columns]
         body = [
-            [shown(value, spec) for value, spec in zip(row, formats, strict=True)]
+            [format_cell(value, spec) for value, spec in zip(row, formats, strict=True)]
             for row in self.rows
         ]
         return [[head for head, _ in self.columns], *body]
@@ -72,7 +72,7 @@ def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def shown(value: Cell, spec: str) -> str:
+def format_cell(value: Cell, spec: str) -> str:
     """
     >>> shown(12.345, ".1f"), shown(None, ".1f"), shown("a", ""), shown(5, ",d"), shown(0.1, ",d")
     ('12.3', '-', 'a', '5', '0')

@@ -13,7 +13,7 @@ import click
 
 from mcz.cli.archive_summary import print_file_results
 from mcz.cli.common import Exit, Failure, about, existing
-from mcz.cli.hints import hinted
+from mcz.cli.hints import add_salvage_hint
 from mcz.cli.options import (
     check_force_rate,
     clips_option,
@@ -244,7 +244,7 @@ def unpack_command(
     import mcz
 
     existing(file)
-    with about(file), hinted(file, {"salvage": salvage}), Progress() as progress:
+    with about(file), add_salvage_hint(file, {"salvage": salvage}), Progress() as progress:
         report = mcz.unpack(
             file,
             folder,

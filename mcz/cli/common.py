@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.hints import OPTION_HINTS, hinted
+from mcz.cli.hints import OPTION_HINTS, add_salvage_hint
 from mcz.cli.terminal import binary_output as binary_output
 from mcz.cli.terminal import echo as echo
 from mcz.cli.terminal import print_json as print_json
@@ -300,7 +300,7 @@ def opened(path: str, **options: Any) -> Iterator[File]:
     import mcz
 
     target = bytes_or_path(path)
-    with about(path), hinted(target, options), mcz.open(target, **options) as file:
+    with about(path), add_salvage_hint(target, options), mcz.open(target, **options) as file:
         if file.grows:
             say(f"{path}: another process is appending to it; this is what it held before")
         yield file

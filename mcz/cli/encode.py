@@ -23,7 +23,7 @@ from mcz.cli.common import (
     print_json,
     say,
 )
-from mcz.cli.figures import reached
+from mcz.cli.figures import error_summary
 from mcz.cli.hints import in_options
 from mcz.cli.options import (
     ITS_RATE_HELP,
@@ -176,7 +176,7 @@ def _tell(target: str, written: Written, as_json: bool) -> None:
         echo(summary(target, written))
         for clip in written.clips:
             if clip.quality is not None:
-                echo(f"  {reached(clip.quality)}")
+                echo(f"  {error_summary(clip.quality)}")
         return
     from mcz.files.reading.report import info
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mcz.cli.common import Exit, Failure, about, damage_of, echo, existing, plural, print_json, say
-from mcz.cli.hints import hinted
+from mcz.cli.hints import add_salvage_hint
 from mcz.cli.options import (
     clips_option,
     copies_option,
@@ -82,7 +82,7 @@ def extract_command(
         raise Failure("extract reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
     output = file_in(output, file)
-    with about(file), hinted(file, {"salvage": salvage}), Progress() as progress:
+    with about(file), add_salvage_hint(file, {"salvage": salvage}), Progress() as progress:
         extraction = mcz.extract(
             file,
             output,

@@ -28,7 +28,7 @@ DISTANCES = ("rms_coordinate_error", "mean_position_error", "max_position_error"
 
 def figure_lines(entries: Params) -> Iterator[str]:
     """Lines of the figures in ``entries``, metric id -> number or text; None is left out."""
-    figures = {_shown(k): _shown(v) for k, v in entries.items() if v is not None}
+    figures = {_printable_text(k): _printable_text(v) for k, v in entries.items() if v is not None}
     yield from _subject_words(figures)
     rows = [["metric", "value", "unit", "cm", ""], *_rows(figures)]
     if len(rows) > 1:
@@ -36,7 +36,7 @@ def figure_lines(entries: Params) -> Iterator[str]:
     yield from _contact_lines(figures)
 
 
-def reached(quality: Mapping[str, str]) -> str:
+def error_summary(quality: Mapping[str, str]) -> str:
     """The error of a lossy clip in one line: of its points, or, without any, of its channels."""
     cm = "mean_position_error_cm" in quality
     suffix, unit = ("_cm", "cm") if cm else ("", "units")
@@ -133,7 +133,7 @@ def _contact_lines(figures: Mapping[str, str]) -> Iterator[str]:
         yield f"they move {path} mm in all, {meant} mm in the original"
 
 
-def _shown(value: object) -> str:
+def _printable_text(value: object) -> str:
     return printable(str(value)[:WIDEST])
 
 

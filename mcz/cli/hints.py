@@ -47,7 +47,7 @@ def in_options(text: str) -> str:
 
 
 @contextmanager
-def hinted(target: str | bytes, options: Params) -> Iterator[None]:
+def add_salvage_hint(target: str | bytes, options: Params) -> Iterator[None]:
     """Add the intact parts of a damaged file, and the hint to salvage them, to its error."""
     try:
         yield

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 Function = Callable[..., object]
 
 
-def moving_options(function: Function) -> Function:
+def motion_options(function: Function) -> Function:
     """``--clip --frames --rate --unit --up --skeleton --arrays --model --max-decoded``."""
     options = (
         click.option(
@@ -73,7 +73,7 @@ def moving_options(function: Function) -> Function:
 
 
 @contextmanager
-def moving_of(
+def open_motion(
     path: str, *, name: str | None, max_decoded: int | None, **facts: Any
 ) -> Iterator[Motion | Clip]:
     """The motion of a source file, or a clip of an .mcz that stays open; errors name the file.
@@ -95,7 +95,9 @@ def moving_of(
         yield SourceOptions(**facts).completing(mcz.read(path, **read))
 
 
-def cut_of(frames: tuple[int, int | None] | None, motion: Motion | Clip) -> tuple[int, int] | None:
+def frame_bounds(
+    frames: tuple[int, int | None] | None, motion: Motion | Clip
+) -> tuple[int, int] | None:
     """``--frames`` with its end, of this motion."""
     if frames is None:
         return None
@@ -127,7 +129,7 @@ def to_size(
     type=click.Path(readable=False),
     help="Write a .gif, .mp4, .webm, .png or .svg. Default: FILE as .gif, a sheet as .png.",
 )
-@moving_options
+@motion_options
 @click.option("--sheet", metavar="N", type=int, help="Draw N poses on one .png or .svg.")
 @click.option(
     "--fps", metavar="R", type=float, help="Set the pictures per second. Default: GIF 25, else 30."
@@ -185,9 +187,14 @@ def render_command(
     facts = {key: options[key] for key in ("rate", "up", "unit")}
     own = {key: options.pop(key) for key in ("arrays", "model")}
     input_options = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts, **own}
-    with moving_of(file, **input_options) as motion, about(file), Progress() as progress:
+    with open_motion(file, **input_options) as motion, about(file), Progress() as progress:
         drawn = mcz.render(
-            motion, target, frames=cut_of(frames, motion), force=force, progress=progress, **options
+            motion,
+            target,
+            frames=frame_bounds(frames, motion),
+            force=force,
+            progress=progress,
+            **options,
         )
     for note in drawn.notes:
         say(f"{file}: {in_options(note)}")
@@ -243,7 +250,7 @@ MOST_ROWS = 24  # of a table that is printed
     metavar="A,B",
     help="Set the lossy codecs of rate-distortion. Default: posewave,mrdwt.",
 )
-@moving_options
+@motion_options
 @click.option(
     "--size", metavar="WxH", callback=to_size, help="Set the size in pixels. Default: by the plot."
 )
@@ -288,12 +295,12 @@ def plot_command(
     if codecs is not None:
         options["codecs"] = [each for each in codecs.split(",") if each]
     with ExitStack() as stack:
-        motion = stack.enter_context(moving_of(file, **input_options))
+        motion = stack.enter_context(open_motion(file, **input_options))
         if other is not None:
-            options["other"] = stack.enter_context(moving_of(other, **input_options))
+            options["other"] = stack.enter_context(open_motion(other, **input_options))
         stack.enter_context(about(file))
         progress = stack.enter_context(Progress())
-        cut = cut_of(frames, motion)
+        cut = frame_bounds(frames, motion)
         plotted = mcz.plot(
             motion, target, what, frames=cut, force=force, progress=progress, **options
         )

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from mcz.files.reading.clip import Clip
     from mcz.model.motion import Motion
     from mcz.show.viewing.embedding import PageWritten
-    from mcz.show.viewing.file_registry import Shelf
+    from mcz.show.viewing.file_registry import FileRegistry
 
 
 FACT_OPTIONS = ("skeleton", "rate", "unit", "up", "arrays", "model")  # facts that a file may lack
@@ -137,7 +137,7 @@ def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **op
         output = file_in(output, files[0], ".rrd" if options["rerun"] else ".html")
     in_rerun = is_rerun(options.pop("rerun"), output)
     _check_use(output, options, in_rerun)
-    from mcz.show.viewing.file_registry import Shelf, put
+    from mcz.show.viewing.file_registry import FileRegistry, add_path
 
     def told(line: str) -> None:
         if as_json:
@@ -146,18 +146,18 @@ def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **op
             say(line)
 
     facts = {key: options[key] for key in FACT_OPTIONS}
-    shelf = Shelf(facts, told, salvage=options["salvage"], hints=OPTION_HINTS)
+    registry = FileRegistry(facts, told, salvage=options["salvage"], hints=OPTION_HINTS)
     try:
         for path in files:
             with about(path):
-                put(shelf, path)
+                add_path(registry, path)
         if in_rerun:
-            return show_in_rerun(shelf, output, as_json, options)
+            return show_in_rerun(registry, output, as_json, options)
         if output is not None:
-            return _write_page(shelf, output, as_json, {key: options[key] for key in OF_PAGE})
-        return _serve(shelf, as_json, **{key: options[key] for key in OF_SERVER})
+            return _write_page(registry, output, as_json, {key: options[key] for key in OF_PAGE})
+        return _serve(registry, as_json, **{key: options[key] for key in OF_SERVER})
     finally:
-        shelf.close()
+        registry.close()
 
 
 def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
@@ -181,18 +181,22 @@ def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
         raise Failure(f"--{shown.replace('_', '-')} applies only {why}", Exit.USAGE)
 
 
-def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str, port: int) -> Exit:
+def _serve(
+    registry: FileRegistry, as_json: bool, no_browser: bool, keep: bool, host: str, port: int
+) -> Exit:
     from mcz.show.viewing.player import viewer_page
     from mcz.show.viewing.server import Server
     from mcz.show.viewing.view import show
 
-    with Server(viewer_page(shelf), shelf, host=host, port=port) as server:
+    with Server(viewer_page(registry), registry, host=host, port=port) as server:
         if as_json:
             print_json({"url": server.url, "files": server.site.work.files()})
         else:
             echo(server.url)
         if not no_browser and not show(server.url):
-            shelf.say("there is no browser to open; the address above is for one on this machine")
+            registry.report(
+                "there is no browser to open; the address above is for one on this machine"
+            )
         try:
             server.site.visitors.wait(for_ever=keep)
         except KeyboardInterrupt:
@@ -200,7 +204,7 @@ def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str,
     return Exit.FINE
 
 
-def _write_page(shelf: Shelf, output: str, as_json: bool, options: Settings) -> Exit:
+def _write_page(registry: FileRegistry, output: str, as_json: bool, options: Settings) -> Exit:
     from pathlib import Path
 
     from mcz.show.viewing.embedding import MOST_BYTES, PageOptions, write_page
@@ -211,7 +215,7 @@ def _write_page(shelf: Shelf, output: str, as_json: bool, options: Settings) -> 
         check_new(Path(output), force)
     with about(output):
         written = write_page(
-            page(shelf.say), shelf, output, PageOptions(**options), most=most, force=force
+            page(registry.report), registry, output, PageOptions(**options), most=most, force=force
         )
     if as_json:
         print_json({"output": output, **asdict(written)})
@@ -239,7 +243,9 @@ def is_rerun(rerun: bool, output: str | None) -> bool:
     return rerun or is_file
 
 
-def show_in_rerun(shelf: Shelf, output: str | None, as_json: bool, options: Settings) -> Exit:
+def show_in_rerun(
+    registry: FileRegistry, output: str | None, as_json: bool, options: Settings
+) -> Exit:
     """Log every requested clip, to ``output`` or to a new viewer."""
     if output is None:
         recording = _recording()
@@ -248,14 +254,14 @@ def show_in_rerun(shelf: Shelf, output: str | None, as_json: bool, options: Sett
             recording.spawn()
         except RuntimeError as error:  # its viewer is not on the path
             raise Failure(f"rerun: {str(error).strip().splitlines()[0]}") from error
-        rows, failed = _log_clips(shelf, recording, options)
+        rows, failed = _log_clips(registry, recording, options)
         recording.flush()
         if as_json:
             print_json({"output": None, "clips": rows})
         else:
             echo(f"rerun: {plural(len(rows), 'clip')}")
     else:
-        rows, failed = _write_rerun(shelf, output, options)
+        rows, failed = _write_rerun(registry, output, options)
         size = Path(output).stat().st_size
         if as_json:
             print_json({"output": output, "size": size, "clips": rows})
@@ -281,12 +287,14 @@ def _check_screen() -> None:
         )
 
 
-def _write_rerun(shelf: Shelf, output: str, options: Settings) -> tuple[list[JsonObject], int]:
+def _write_rerun(
+    registry: FileRegistry, output: str, options: Settings
+) -> tuple[list[JsonObject], int]:
     """Log to a file, which appears when it is complete."""
     from mcz.files.writing.atomic import replacing
 
     check_new(Path(output), options["force"])
-    inputs = [file.source for _, file in shelf.given()]
+    inputs = [file.source for _, file in registry.initial_files()]
     with (
         about(output),
         tempfile.TemporaryDirectory() as folder,
@@ -294,7 +302,7 @@ def _write_rerun(shelf: Shelf, output: str, options: Settings) -> tuple[list[Jso
     ):
         path, recording = Path(folder, "take.rrd"), _recording()
         recording.save(path)
-        rows, failed = _log_clips(shelf, recording, options)
+        rows, failed = _log_clips(registry, recording, options)
         recording.disconnect()
         if not rows:
             raise Failure("no clip could be logged", path=output)
@@ -303,15 +311,17 @@ def _write_rerun(shelf: Shelf, output: str, options: Settings) -> tuple[list[Jso
     return rows, failed
 
 
-def _log_clips(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[JsonObject], int]:
+def _log_clips(
+    registry: FileRegistry, recording: Any, options: Settings
+) -> tuple[list[JsonObject], int]:
     from mcz.errors import MczError
     from mcz.show.rerun import to_rerun, view_of
 
     rows: list[JsonObject] = []
     views: list[Any] = []
     failed = unknown = 0
-    several = len(shelf.given()) > 1
-    for file, clip in _clips(shelf, options):
+    several = len(registry.initial_files()) > 1
+    for file, clip in _clips(registry, options):
         entity = f"{file}/{clip.name}" if several else clip.name
         try:
             motion = _complete(clip, options)
@@ -320,12 +330,12 @@ def _log_clips(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[Js
             if len(views) < MOST_VIEWS:
                 views.append(view_of(motion, entity))
         except MczError as error:
-            shelf.say(f"{file}: {clip.name}: {error.describe(OPTION_HINTS)}")
+            registry.report(f"{file}: {clip.name}: {error.describe(OPTION_HINTS)}")
             failed += 1
             continue
         rows.append({"file": file, "name": clip.name, "entity": entity, "n_frames": clip.n_frames})
     if unknown:
-        shelf.say(f"{plural(unknown, 'clip')}: the up axis is unknown; set it with --up")
+        registry.report(f"{plural(unknown, 'clip')}: the up axis is unknown; set it with --up")
     if views:
         blueprint = import_extra("rerun.blueprint", "rerun")
         arranged = blueprint.Grid if len(views) <= MOST_BESIDE else blueprint.Tabs
@@ -333,10 +343,10 @@ def _log_clips(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[Js
     return rows, failed
 
 
-def _clips(shelf: Shelf, options: Settings) -> Iterator[tuple[str, Clip]]:
+def _clips(registry: FileRegistry, options: Settings) -> Iterator[tuple[str, Clip]]:
     from mcz.files.reading.file import open
 
-    for _, given in shelf.given():
+    for _, given in registry.initial_files():
         with (
             about(given.source),
             open(

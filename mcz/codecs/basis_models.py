@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.streams import code, start_states, uncode
+from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import Layout, Model, model_id
 from mcz.errors import FormatError, MotionError, UnsupportedError
 from mcz.model.extras import annex_bytes, annex_names
@@ -76,7 +76,7 @@ def build_bases(bases: Sequence[Basis | Floats], shift: int = FINE) -> bytes:
         head += varint(n_points) + varint(n_vectors) + bytes(part.shifts.tolist())
     tables = [part.entries.copy() for part in parts]
     shifts = [part.shifts for part in parts]
-    return head + code(
+    return head + encode_stream(
         start_states("pca")[0],
         2 * size + 256,
         lambda state, data: _loop(state, data, tables, shifts),
@@ -123,7 +123,7 @@ def parse_bases(data: bytes, where: str = "model") -> tuple[Basis, ...]:
     heads, at = parse_heads(data, where)
     shifts = [head.shifts for head in heads]
     tables = [np.zeros((len(head.shifts), head.n_points), np.int64) for head in heads]
-    uncode(
+    decode_stream(
         data[at:],
         start_states("pca")[0],
         lambda state, stream: _loop(state, stream, tables, shifts),

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from mcz.show.viewing.file_registry import Shelf, put
+from mcz.show.viewing.file_registry import FileRegistry, add_path
 from mcz.show.viewing.page import page
 from mcz.show.viewing.server import Server
 
@@ -27,10 +27,10 @@ class Answer(NamedTuple):
 @contextmanager
 def serve_files(*paths: object, **facts: Any) -> Iterator[Server]:
     """A server of the page and of files."""
-    shelf = Shelf(facts)
+    registry = FileRegistry(facts)
     for path in paths:
-        put(shelf, str(path))
-    with Server(page(), shelf) as server:
+        add_path(registry, str(path))
+    with Server(page(), registry) as server:
         yield server
 
 

@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 import mcz
 from mcz import AccessError, FormatError, OptionError
 from mcz.model.extras import annex_bytes
-from mcz.show.viewing import file_registry as shelf_module
-from mcz.show.viewing.file_registry import Shelf, put
+from mcz.show.viewing import file_registry as registry_module
+from mcz.show.viewing.file_registry import FileRegistry, add_path
 from mcz.show.viewing.page import Page, page
 from mcz.show.viewing.requests import Refused, range_of
 from mcz.show.viewing.server import Server
@@ -141,20 +141,20 @@ def test_a_source_that_changed_is_converted_anew(samples: Path, tmp_path: Path) 
 def test_what_is_below_a_folder_is_converted_anew(
     samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shelf_module, "SCAN_FACTOR", 0)
+    monkeypatch.setattr(registry_module, "SCAN_FACTOR", 0)
     folder = tmp_path / "takes"
     (folder / "deep").mkdir(parents=True)
     source = folder / "deep" / "walk.bvh"
     source.write_bytes((samples / "walk.bvh").read_bytes())
-    shelf = Shelf()
-    put(shelf, str(folder))
-    first = shelf[0].target()
+    registry = FileRegistry()
+    add_path(registry, str(folder))
+    first = registry[0].target()
     (folder / "notes.txt").write_text("no motion")
-    assert shelf[0].target() == first
+    assert registry[0].target() == first
     source.write_bytes(source.read_bytes() + b"\n")
-    with mcz.open(shelf[0].target()) as file:
+    with mcz.open(registry[0].target()) as file:
         assert file.only_clip().source_bytes() == source.read_bytes()
-    shelf.close()
+    registry.close()
 
 
 @pytest.mark.parametrize("is_named", [False, True])
@@ -165,35 +165,35 @@ def test_an_amc_is_converted_anew_with_its_asf(
     asf = tmp_path / "elsewhere" / "other.asf" if is_named else tmp_path / "walk.asf"
     asf.parent.mkdir(exist_ok=True)
     asf.write_bytes((samples / "walk.asf").read_bytes())
-    shelf = Shelf({"skeleton": str(asf)} if is_named else None)
-    put(shelf, str(tmp_path / "walk.amc"))
-    first = shelf[0].target()
-    assert shelf[0].target() == first
+    registry = FileRegistry({"skeleton": str(asf)} if is_named else None)
+    add_path(registry, str(tmp_path / "walk.amc"))
+    first = registry[0].target()
+    assert registry[0].target() == first
     asf.write_bytes(b"# edited\n" + asf.read_bytes())
-    assert shelf[0].target() != first
-    shelf.close()
+    assert registry[0].target() != first
+    registry.close()
 
 
 def test_a_folder_is_its_files_and_one_archive(samples: Path, folder: Path) -> None:
-    shelf = Shelf()
-    put(shelf, str(folder))
-    assert [(file.name, file.kind) for _, file in shelf.given()] == [
+    registry = FileRegistry()
+    add_path(registry, str(folder))
+    assert [(file.name, file.kind) for _, file in registry.initial_files()] == [
         ("walk.mcz", "mcz"),
         (folder.name, "folder"),
     ]
-    put(shelf, str(samples))
-    with mcz.open(shelf[2].target()) as file:
+    add_path(registry, str(samples))
+    with mcz.open(registry[2].target()) as file:
         assert len(file) == 3
-    shelf.close()
+    registry.close()
     with pytest.raises(OptionError, match="no motion file"):
-        put(Shelf(), str(Path(__file__).parent))
+        add_path(FileRegistry(), str(Path(__file__).parent))
 
 
 @pytest.mark.parametrize("name", ["none.mcz", "walk.asf", "walk.txt", "http://x/a.bvh", ""])
 def test_what_cannot_be_shown_is_refused_at_once(samples: Path, name: str) -> None:
     path = name if "://" in name or not name else str(samples / name)
     with pytest.raises((AccessError, OptionError)):
-        put(Shelf(), path)
+        add_path(FileRegistry(), path)
 
 
 def test_a_url_is_read_by_ranges(folder: Path) -> None:
@@ -393,15 +393,15 @@ def test_a_request_cannot_hide_another(server: Server) -> None:
 def test_only_this_machine_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
     for host in ("0.0.0.0", "", "example.org", "192.168.0.1"):
         with pytest.raises(OptionError, match="this machine alone"):
-            Server(page(), Shelf(), host=host)
-    with Server(page(), Shelf()) as server, pytest.raises(AccessError):
-        Server(page(), Shelf(), port=server.site.port)
+            Server(page(), FileRegistry(), host=host)
+    with Server(page(), FileRegistry()) as server, pytest.raises(AccessError):
+        Server(page(), FileRegistry(), port=server.site.port)
 
 
 def test_too_many_connections_are_closed(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     from threading import BoundedSemaphore
 
-    with Server(page(), Shelf()) as small:
+    with Server(page(), FileRegistry()) as small:
         small._free = BoundedSemaphore(1)
         with small._free, pytest.raises(OSError):
             ask(small, "api.json")
@@ -530,12 +530,12 @@ def test_a_form_is_no_json(server: Server) -> None:
 
 
 def test_results_are_few(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shelf_module, "MOST_RESULTS", 2)
+    monkeypatch.setattr(registry_module, "MOST_RESULTS", 2)
     with serve_files(folder / "walk.mcz") as server:
         asked = {"url": "files/0", "codec": "mrdwt", "params": {"T_g": 8}}
         urls = [post(server, "encode", asked).json["url"] for _ in range(4)]
         assert [ask(server, url).status for url in urls] == [404, 404, 200, 200]
-        assert len(list(server.site.shelf.folder().iterdir())) == 2
+        assert len(list(server.site.registry.folder().iterdir())) == 2
 
 
 # Files that the page gives -------------------------------------------------------
@@ -588,12 +588,12 @@ def test_an_amc_comes_with_its_asf(server: Server, samples: Path) -> None:
     ],
 )
 def test_hostile_forms(server: Server, body: bytes, status: int) -> None:
-    before = sorted(server.site.shelf.folder().iterdir())
+    before = sorted(server.site.registry.folder().iterdir())
     answer = convert(server, body)
     assert answer.status == status, answer.body
     assert answer.json["error"]["message"]
-    assert str(server.site.shelf.folder()) not in answer.json["error"]["message"]
-    assert sorted(server.site.shelf.folder().iterdir()) == before
+    assert str(server.site.registry.folder()) not in answer.json["error"]["message"]
+    assert sorted(server.site.registry.folder().iterdir()) == before
 
 
 @given(body=st.binary(max_size=200), cut=st.integers(0, 300))
@@ -639,8 +639,8 @@ def test_too_much_is_refused(server: Server, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_uploads_are_few(samples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shelf_module, "MOST_UPLOADS", 1)
-    with Server(page(), Shelf()) as server:
+    monkeypatch.setattr(registry_module, "MOST_UPLOADS", 1)
+    with Server(page(), FileRegistry()) as server:
         body = form(("walk.bvh", (samples / "walk.bvh").read_bytes()))
         assert convert(server, body).status == 200
         assert convert(server, body).json["error"]["class"] == "LimitError"

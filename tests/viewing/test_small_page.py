@@ -11,7 +11,7 @@ import pytest
 import mcz
 from mcz import AccessError
 from mcz.show.viewing import page
-from mcz.show.viewing.file_registry import Shelf, put
+from mcz.show.viewing.file_registry import FileRegistry, add_path
 from mcz.show.viewing.page import built
 from mcz.show.viewing.player import MOST_CLIPS, viewer_page
 from mcz.show.viewing.server import Server
@@ -34,10 +34,10 @@ def test_it_plays_every_clip_and_names_the_way_to_the_viewer(
     damaged = tmp_path / "<b>.bvh"
     damaged.write_bytes((samples / "walk.bvh").read_bytes()[:300])
     told: list[str] = []
-    shelf = Shelf({}, told.append)
+    registry = FileRegistry({}, told.append)
     for path in (samples / "walk.bvh", samples / "walk.c3d", damaged):
-        put(shelf, str(path))
-    with Server(viewer_page(shelf), shelf) as server:
+        add_path(registry, str(path))
+    with Server(viewer_page(registry), registry) as server:
         answer = ask(server, "")
     text = answer.body.decode()
     assert answer.status == 200
@@ -56,9 +56,9 @@ def test_a_large_archive_shows_its_first_clips(
     for number in range(MOST_CLIPS + 1):
         (tmp_path / f"{number}.bvh").write_text(text.replace("OFFSET 0", f"OFFSET {number}", 1))
     mcz.pack(tmp_path, tmp_path / "takes.mcz")
-    shelf = Shelf()
-    put(shelf, str(tmp_path / "takes.mcz"))
-    page_text = viewer_page(shelf).text
+    registry = FileRegistry()
+    add_path(registry, str(tmp_path / "takes.mcz"))
+    page_text = viewer_page(registry).text
     assert page_text.count("<iframe ") == MOST_CLIPS
     assert f"The first {MOST_CLIPS} clips are shown." in page_text
 
@@ -67,7 +67,7 @@ def test_a_page_that_the_environment_names_is_not_replaced(
     samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(page.OTHER, str(tmp_path / "none.html"))
-    shelf = Shelf()
-    put(shelf, str(samples / "walk.bvh"))
+    registry = FileRegistry()
+    add_path(registry, str(samples / "walk.bvh"))
     with pytest.raises(AccessError, match=r"none\.html"):
-        viewer_page(shelf)
+        viewer_page(registry)

@@ -34,7 +34,7 @@ def bare_state() -> Ints:
     return np.zeros(_coder().SQUASH, np.int64)
 
 
-def code(start: Ints, size: int, loop: Loop, what: str) -> bytes:
+def encode_stream(start: Ints, size: int, loop: Loop, what: str) -> bytes:
     """The bytes that ``loop`` writes from the state ``start``; about ``size`` are expected."""
     while True:
         data, state = np.zeros(size, np.uint8), start.copy()
@@ -47,7 +47,7 @@ def code(start: Ints, size: int, loop: Loop, what: str) -> bytes:
         size = used + 256
 
 
-def uncode(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: bool) -> None:
+def decode_stream(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: bool) -> None:
     """Run ``loop`` on ``stream``; ``whole``: all its bytes must be needed.
 
     Raises FormatError, with ``what`` in front, for a bad code or extra bytes.

@@ -12,7 +12,14 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.streams import bare_state, code, halves_of, scale_of, start_states, uncode
+from mcz.codecs.coding.streams import (
+    bare_state,
+    decode_stream,
+    encode_stream,
+    halves_of,
+    scale_of,
+    start_states,
+)
 from mcz.errors import FormatError
 from mcz.model.types import Ints
 
@@ -47,7 +54,7 @@ def build_marks(points: Ints) -> bytes:
         return b""
     halves = _halves(np.diff(points, axis=0))
     loops = _kernels()
-    body = code(
+    body = encode_stream(
         start_states("qbc")[MARKS],
         4 * points.size + 256,
         lambda state, data: (
@@ -65,7 +72,7 @@ def parse_marks(stream: bytes, count: int, n_channels: int, name: str) -> Ints:
         return points
     halves = _scale(stream, 0, name)
     loops = _kernels()
-    uncode(
+    decode_stream(
         stream[1:],
         start_states("qbc")[MARKS],
         lambda state, data: loops.code_marks(state, data, points, count, scale_of(halves)) < 0,
@@ -81,7 +88,7 @@ def parse_first_mark(stream: bytes, n_channels: int, name: str) -> Ints:
     if stream:
         _scale(stream, 0, name)
         loops = _kernels()
-        uncode(
+        decode_stream(
             stream[1:],
             bare_state(),
             lambda state, data: loops.code_marks(state, data, points, 1, 1) < 0,
@@ -108,7 +115,7 @@ def build_curves(marks: Ints, frames: Ints, curves: Curves) -> bytes:
     halves = np.array([_halves(steps // 2), _halves(bends)])
     scales = np.array([scale_of(int(h)) for h in halves])
     loops = _kernels()
-    body = code(
+    body = encode_stream(
         start_states("qbc")[DETAILS],
         8 * curves.ends.size + 4 * len(curves.lengths) + 256,
         lambda state, data: (
@@ -146,7 +153,7 @@ def parse_curves(stream: bytes, marks: Ints, frames: Ints, name: str, *, whole: 
         return n_curves[0] >= 0
 
     # QBC-15
-    uncode(stream[2:], start_states("qbc")[DETAILS], loop, f"{name}: a curve", whole=whole)
+    decode_stream(stream[2:], start_states("qbc")[DETAILS], loop, f"{name}: a curve", whole=whole)
     n = n_curves[0]
     return Curves(lengths[:n], ends[:n], mids[:n])
 

@@ -28,7 +28,7 @@ from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
 from mcz.codecs.coding.fast.encoder import kernels as fast_kernels
 from mcz.codecs.coding.fast.lanes import fault_of
 from mcz.codecs.coding.forms import WITH_UNIT
-from mcz.codecs.coding.streams import code, start_states, uncode
+from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -185,7 +185,9 @@ def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[
     model = _Model(lanes, table, leads, rests)
     for row, ones in zip(model.references, references, strict=True):
         row[: 1 + len(ones)] = len(ones), *ones
-    bits = code(start_states("best")[0], 4 * leads.size + 1024, model.run, "best: a segment")
+    bits = encode_stream(
+        start_states("best")[0], 4 * leads.size + 1024, model.run, "best: a segment"
+    )
     residuals = (build_echoes(echoes) if echoes else b"") + bits
     room = np.empty(plan.most_bytes, np.uint8)
     heads = room[: write.write_heads(plan.channels, 0, plan.fields, room)].tobytes()
@@ -254,7 +256,7 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     model = _Model(lanes.predictors, table, lanes.leads, rests)
     model.most_work = WORK * (len(stream) + SPARE)
     start = start_states("best")[0]  # BEST-06
-    uncode(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
+    decode_stream(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
     tails = own.Tails(lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns)
     leads = lanes.leads[residual.BEHIND :]
     given = _exact_echoes(table, decoder)

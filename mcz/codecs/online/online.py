@@ -67,59 +67,59 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     Raises MotionError for a value that is not finite, or is too large, OptionError for
     contradictory parameters, or a rate without a known frame rate.
     """
-    chosen = settle_options(params)
-    choice, order = choose_options(sample_of(NAME, source), chosen)
+    parameters = settle_options(params)
+    choice, order = choose_options(sample_of(NAME, source), parameters)
     layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
-    header = build(_header(choice.fields, order, chosen), f"{NAME} header")
-    writer = _Writer(header, layout, chosen)
+    header = build(_header(choice.fields, order, parameters), f"{NAME} header")
+    writer = _Writer(header, layout, parameters)
     preset = PRESET_IDS[params["preset"]]
     coded = _segments(source, writer)
     return Encoded(header, coded, models=choice.models, known=choice.known, preset=preset)
 
 
-def _header(space: SpaceFields, order: int, chosen: Params) -> OnlineHeader:
-    coder = MIXED if chosen["coder"] == "mixed" else GOLOMB
+def _header(space: SpaceFields, order: int, parameters: Params) -> OnlineHeader:
+    coder = MIXED if parameters["coder"] == "mixed" else GOLOMB
     return OnlineHeader(space=space, order=order, coder=coder)
 
 
 class _Writer:
     """Frame kinds (LTR or STR, intra or not), the same for files and live streams."""
 
-    def __init__(self, header: bytes, layout: Layout, chosen: Params) -> None:
-        self.chosen, self.layout = dict(chosen), layout
+    def __init__(self, header: bytes, layout: Layout, parameters: Params) -> None:
+        self.parameters, self.layout = dict(parameters), layout
         self.coder = Coder(header, layout)
-        self.plan = plan_of(chosen, layout, self.coder.space.step)
-        self.left = 0  # remaining frames of the group
+        self.plan = plan_of(parameters, layout, self.coder.space.step)
+        self.frames_left = 0  # remaining frames of the group
         self._size = 0  # of the group
         self._groups = 0  # since the last intra coded one
         self._waiting: Settings | None = None  # parameters of the next group on
 
     def kind(self) -> int:
         """Kind of the next frame."""
-        if self.left:
+        if self.frames_left:
             return STR
-        period = self.chosen["intra_period"]
+        period = self.parameters["intra_period"]
         if self.coder.at == 0 or (period and self._groups >= period):
             return INTRA
         return LTR
 
     def code(self, frames: Floats, n_group: int | None = None) -> Unit:
         """The unit of frames of one group of ``n_group`` frames; raises MotionError."""
-        if not self.left and self._waiting is not None:
-            self.chosen, self._waiting = self._waiting, None
-            set_plan(self.plan, self.chosen, self.layout, self.coder.space.step)
+        if not self.frames_left and self._waiting is not None:
+            self.parameters, self._waiting = self._waiting, None
+            set_plan(self.plan, self.parameters, self.layout, self.coder.space.step)
         kind = self.kind()
-        size = self._size if kind == STR else n_group or self.chosen["gof"]
-        unit = self.coder.encode(kind, frames, size, self.chosen["threshold"], self.plan)
+        size = self._size if kind == STR else n_group or self.parameters["gof"]
+        unit = self.coder.encode(kind, frames, size, self.parameters["threshold"], self.plan)
         if kind != STR:
             self._groups = 1 if kind == INTRA else self._groups + 1
-            self.left = self._size = size
-        self.left -= len(frames)
+            self.frames_left = self._size = size
+        self.frames_left -= len(frames)
         return unit
 
     def change(self, options: Params) -> None:
         """Apply parameters from the next group on."""
-        self._waiting = settle_options({**self.chosen, **(self._waiting or {}), **options})
+        self._waiting = settle_options({**self.parameters, **(self._waiting or {}), **options})
 
 
 def _segments(source: SignalSource, writer: _Writer) -> Iterator[Segment]:
@@ -130,12 +130,12 @@ def _segments(source: SignalSource, writer: _Writer) -> Iterator[Segment]:
             yield Segment(0, layout.n_frames, ())
         return
     reader = FrameReader(NAME, source)
-    least = writer.chosen["segment_frames"] or SEGMENT_FRAMES
+    least = writer.parameters["segment_frames"] or SEGMENT_FRAMES
     units: list[Unit] = []
     first = 0
     while reader.at < layout.n_frames:
-        n_group = min(writer.chosen["gof"], layout.n_frames - reader.at)
-        n_frames = min(writer.left or n_group, layout.most_frames)
+        n_group = min(writer.parameters["gof"], layout.n_frames - reader.at)
+        n_frames = min(writer.frames_left or n_group, layout.most_frames)
         if units and _is_full(units, reader.at - first, least, n_frames, writer):
             yield _segment(first, units)
             units, first = [], reader.at
@@ -150,7 +150,7 @@ def _is_full(
     """Return True if the segment ends before the next unit of ``n_more`` frames."""
     if n_frames + n_more > writer.layout.most_frames:
         return True
-    due = INTRA if writer.chosen["intra_period"] else LTR
+    due = INTRA if writer.parameters["intra_period"] else LTR
     large = n_frames >= least or sum(len(unit.data) for unit in units) > TARGET_BYTES
     return large and writer.kind() >= due
 
@@ -213,12 +213,12 @@ class _LiveEncoder(LiveEncoder):
     version: int | None = None
 
     def __init__(self, layout: Layout, options: Params) -> None:
-        chosen = settle_options(options)
-        choice, order = choose_live_options(layout, chosen)
-        self.header = build(_header(choice.fields, order, chosen), f"{NAME} header")
+        parameters = settle_options(options)
+        choice, order = choose_live_options(layout, parameters)
+        self.header = build(_header(choice.fields, order, parameters), f"{NAME} header")
         self.models, self.preset = choice.models, PRESET_IDS[options["preset"]]
         resolved = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
-        self._writer = _Writer(self.header, resolved, chosen)
+        self._writer = _Writer(self.header, resolved, parameters)
         self._rows = LiveRows(NAME, layout)
 
     def push(self, values: Floats, valid: Bools | None = None) -> tuple[bytes, bool]:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from mcz.codecs.coding.streams import (
     choose_predictor,
-    code,
+    decode_stream,
+    encode_stream,
     halves_of,
     scale_of,
     start_states,
-    uncode,
 )
 from mcz.errors import FormatError, MotionError
 from mcz.model.schema import read_varint, varint
@@ -55,7 +55,7 @@ def build_stream(components: Components, *, scaled: bool) -> bytes:
     sides += bytes(min(halves, MAX_SCALE) | predictor << 6 for predictor, halves in forms)
     head += bytes((mean_scale,)) + varint(len(components.basis)) + sides
     count = components.means.size + components.basis.size + components.coefficients.size
-    return head + code(
+    return head + encode_stream(
         start_states("pca")[0],
         4 * count + 256,
         lambda state, data: _loop(
@@ -95,7 +95,7 @@ def parse_stream(
         raise FormatError("pca: the form of a component has the scale 63")
     basis = np.zeros((count, n_channels), np.int64)
     rows = np.zeros((n_decoded, count), np.int64)
-    uncode(
+    decode_stream(
         stream[at + 2 * count :],
         start_states("pca")[0],  # PCA-09
         lambda state, data: _loop(state, data, means, basis, rows, sides, mean_scale),

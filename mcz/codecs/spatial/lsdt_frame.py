@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import space_choices
-from mcz.codecs.coding.streams import code, start_states, uncode
+from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -238,7 +238,7 @@ class _Coder:
             self._lengths, self._tracks = before[0].copy(), before[1].copy()
             return self._code(state, data, indices)
 
-        stream = code(self._models.copy(), indices.size + 256, loop, "a coefficient")
+        stream = encode_stream(self._models.copy(), indices.size + 256, loop, "a coefficient")
         self._begins = 0
         return stream
 
@@ -248,7 +248,7 @@ class _Coder:
             # FRAME-06
             parse_vectors(stream, indices, self.space.starts, self.codes, what, whole=whole)
             return
-        uncode(
+        decode_stream(
             stream,
             self._models,  # FRAME-07
             lambda state, data: self._code(state, data, indices),

@@ -12,7 +12,7 @@ from types import ModuleType
 
 import numpy as np
 
-from mcz.codecs.coding.streams import code, start_states, uncode
+from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -300,7 +300,7 @@ def _starts(rows: Ints) -> Ints:
 
 def _adaptive(rows: Ints, starts: Ints) -> bytes:
     lengths = np.zeros(len(rows), np.int64)
-    return code(
+    return encode_stream(
         start_states("window")[0],
         rows.size + 256,
         lambda state, data: _kernels().code_window(state, data, rows, starts, lengths) < 0,
@@ -320,7 +320,7 @@ def parse_window(
         lengths = n_frequencies - np.argmax(rows[:, ::-1] != 0, axis=1)
         lengths[~rows.any(axis=1)] = 0
     else:
-        uncode(
+        decode_stream(
             data,
             start_states("window")[0],  # WIND-10
             # WIND-10

@@ -21,15 +21,15 @@ from mcz.model.types import Floats, Ints, Params
 class _FixedQuantizer(Quantizer):
     """A quantizer with the header's least magnitude of details."""
 
-    held: int = 1
+    fixed_least: int = 1
 
     @property
     def least(self) -> int:
-        return self.held
+        return self.fixed_least
 
     def indices(self, coefficients: Floats, channel: int, *, detail: bool) -> Ints:
         indices = Quantizer.indices(self, coefficients, channel, detail=detail)
-        return np.where(np.abs(indices) < self.held, 0, indices) if detail else indices
+        return np.where(np.abs(indices) < self.fixed_least, 0, indices) if detail else indices
 
 
 # (source, options) -> the weights (n_channels,) of the signal, which times a threshold are the

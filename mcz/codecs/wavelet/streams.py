@@ -14,7 +14,13 @@ from types import ModuleType
 
 import numpy as np
 
-from mcz.codecs.coding.streams import choose_predictor, code, scale_of, start_states, uncode
+from mcz.codecs.coding.streams import (
+    choose_predictor,
+    decode_stream,
+    encode_stream,
+    scale_of,
+    start_states,
+)
 from mcz.codecs.parameters import code_of, ratio_of
 from mcz.errors import FormatError, MotionError, OptionError
 from mcz.model.schema import read_varint, varint
@@ -113,7 +119,7 @@ def _build_approximations(band: Ints, step: int, coding: Coding, has_details: bo
         return bytes((CONSTANT,)) + codes + first
     predictor, halves = choose_predictor(band)
     loops = _kernels()
-    body = code(
+    body = encode_stream(
         start_states("wavelet")[0],
         2 * len(band) + 256,
         lambda state, data: (
@@ -131,7 +137,7 @@ def _build_details(band: Ints, coarser: Ints, number: int, coding: Coding) -> by
     if not band.any():
         return b""
     loops = _kernels()
-    return code(
+    return encode_stream(
         start_states("wavelet")[number],
         2 * len(band) + 256,
         lambda state, data: (
@@ -172,7 +178,7 @@ def _parse_approximations(
         return np.full(prefix, first, np.int64), step, True  # MRDWT-23
     band[:1] = first
     loops = _kernels()
-    uncode(
+    decode_stream(
         stream[at:],
         start_states("wavelet")[0],  # MRDWT-30
         lambda state, data: (
@@ -190,7 +196,7 @@ def _parse_details(
     band = np.zeros(prefix, np.int64)
     if stream:
         loops = _kernels()
-        uncode(
+        decode_stream(
             stream,
             start_states("wavelet")[number],  # MRDWT-30
             lambda state, data: (

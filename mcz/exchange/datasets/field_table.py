@@ -30,17 +30,17 @@ FORMS = {
 SIGNAL = "signal:"  # before the name of a signal that is also the name of a field
 
 
-def field_called(name: str) -> Field:
+def find_field(name: str) -> Field:
     """The field of that name: one of ``FIELDS``, else a signal."""
     return FIELDS.get(name) or _signal(name)
 
 
-def chosen_fields(names: str | Iterable[str]) -> tuple[Field, ...]:
+def parse_fields(names: str | Iterable[str]) -> tuple[Field, ...]:
     """The fields of these names, a list or a text with commas; raises OptionError."""
     listed = [n.strip() for n in names.split(",")] if isinstance(names, str) else list(names)
     if not listed or len(set(listed)) != len(listed) or not all(listed):
         raise OptionError(f"fields is {names!r}; name at least one field, and none twice")
-    return tuple(field_called(str(name)) for name in listed)
+    return tuple(find_field(str(name)) for name in listed)
 
 
 def _signal(name: str) -> Field:

@@ -16,7 +16,7 @@ import numpy as np
 from mcz.container.caches import DecodedCache, SharedCache
 from mcz.errors import OptionError
 from mcz.exchange.datasets.caches import Arrays
-from mcz.exchange.datasets.field_table import SIGNAL, chosen_fields
+from mcz.exchange.datasets.field_table import SIGNAL, parse_fields
 from mcz.exchange.datasets.fields import WHOLE, Field, Rows, Subject, Units, features_of
 from mcz.exchange.datasets.subjects import subject_of
 from mcz.files.reading.clip import Clip
@@ -91,7 +91,7 @@ class Recipe:
 
 def recipe_of(names: str | Iterable[str], *facts: Any) -> Recipe:
     """The recipe of fields by name; raises OptionError."""
-    return Recipe(chosen_fields(names), *facts)
+    return Recipe(parse_fields(names), *facts)
 
 
 class Sources:

@@ -50,7 +50,7 @@ class Body:
     points: tuple[int, ...]  # the tails, as points of the skeleton
 
     @property
-    def shown(self) -> Ints:
+    def drawn_nodes(self) -> Ints:
         """The nodes that are drawn."""
         return np.unique(np.concatenate([self.bones.ravel(), self.lone]))
 

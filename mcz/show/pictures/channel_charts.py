@@ -95,7 +95,7 @@ class _Series:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Shown:
+class _ChartData:
     """The series of a chart; ``runs`` of rows have no break in time.
 
     ``joint`` is theirs, None for a signal's channels. ``when`` labels ``at``.
@@ -110,7 +110,7 @@ class _Shown:
     notes: tuple[str, ...] = ()
 
 
-def _shown(motion: Motion, selection: Selection, first: int) -> _Shown:
+def _chart_data(motion: Motion, selection: Selection, first: int) -> _ChartData:
     index = _signal_of(motion, selection)
     signal, timeline = motion.signals[index], motion.timeline
     at, when = times_of(motion, first, index)
@@ -136,7 +136,7 @@ def _shown(motion: Motion, selection: Selection, first: int) -> _Shown:
     ]
     per_frame = signal.samples_per_frame
     rows = [(start * per_frame, stop * per_frame) for start, stop in runs]
-    return _Shown(name, joint, series, when, rows or [(0, 0)], per_frame, notes)
+    return _ChartData(name, joint, series, when, rows or [(0, 0)], per_frame, notes)
 
 
 def _signal_of(motion: Motion, selection: Selection) -> int:
@@ -181,7 +181,7 @@ def _columns(
 
 def channel_chart(motion: Motion, selection: Selection, first: int = 0) -> Chart:
     """Channels over time; ``first`` is the frame of the clip where the motion begins."""
-    shown = _shown(motion, selection, first)
+    shown = _chart_data(motion, selection, first)
     rows: list[list[object]] = [["channel", "in", "least", "mean", "greatest", "unknown"]]
     for each in shown.series:
         known = each.numbers[np.isfinite(each.numbers)]
@@ -207,7 +207,7 @@ def _panels(
         legend(axes, theme, loc="upper right", ncols=len(own))
 
 
-def _draw_channels(figure: Figure, theme: Theme, *, shown: _Shown) -> None:
+def _draw_channels(figure: Figure, theme: Theme, *, shown: _ChartData) -> None:
     for axes, own in _panels(figure, theme, shown.series, shown.when, "{unit}"):
         for place, each in enumerate(own):
             draw_runs(axes, (each.at, each.numbers), shown.runs, _color(theme, place), each.label)
@@ -253,7 +253,7 @@ def spectrum_chart(motion: Motion, selection: Selection) -> Chart:
         values = Unwrapper(motion.skeleton)(np.asarray(first.masked(), np.float64))
         mended = Signal(values, name=first.name, samples_per_frame=first.samples_per_frame)
         turned = replace(motion, signals=(mended, *motion.signals[1:]), source=None)
-    shown = _shown(turned, selection, 0)
+    shown = _chart_data(turned, selection, 0)
     rate = shown.per_frame / (period or 1.0)
     given = [*shown.series, *([] if shown.joint is None else _speed(motion, shown.joint))]
     series = [spectrum for each in given if (spectrum := _spectrum(each, rate)) is not None]

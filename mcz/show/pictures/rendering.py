@@ -356,7 +356,7 @@ def _heading(stage: Stage, layout: Layout, title: str, top: float, letter: float
     for note in notes:
         words.append(Word(x, top, note, theme.quiet, letter - 2, "right"))
         x -= (len(note) + 2) * 0.62 * (letter - 2)
-    sides = stage.track.body.sides[stage.track.body.shown]
+    sides = stage.track.body.sides[stage.track.body.drawn_nodes]
     if (sides == LEFT).any() and (sides == RIGHT).any():
         for text, color in (("right", theme.right), ("left", theme.left)):
             words.append(Word(x, top, f"\u25cf {text}", color, letter - 2, "right"))

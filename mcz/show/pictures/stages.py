@@ -103,7 +103,7 @@ def steadied(centers: Floats, rate: float) -> Floats:
 def _box(track: Track, axes: Floats, targets: Floats | None) -> tuple[Floats, Floats]:
     """Extent that the camera must see, along its axes: about ``targets``, or about the origin."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    shown, done = track.body.shown, 0
+    shown, done = track.body.drawn_nodes, 0
     for frames, places in track.blocks():
         about = 0.0 if targets is None else targets[done : done + len(frames)][:, None]
         seen = (places[:, shown] - about) @ axes.T
@@ -132,7 +132,7 @@ def words_around(stage: Stage, width: int, height: int, title: str, when: str) -
         Word(width - edge, bottom, stage.grid_text, theme.quiet, letter, "right"),
     ]
     x = edge
-    sides = stage.track.body.sides[stage.track.body.shown]
+    sides = stage.track.body.sides[stage.track.body.drawn_nodes]
     if (sides == LEFT).any() and (sides == RIGHT).any():
         for text, color in (("left", theme.left), ("right", theme.right)):
             words.append(Word(x, bottom, f"\u25cf {text}", color, letter))

@@ -91,7 +91,7 @@ def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None)
     axis = skeleton.up_axis or up or guessed_up(body, seen)
     seen = _turned(seen, axis)
     body = fitted(body, seen)
-    size = size_of(seen[:, body.shown])
+    size = size_of(seen[:, body.drawn_nodes])
     track = Track(
         moving=moving,
         body=body,
@@ -115,7 +115,7 @@ def unknown(moving: MotionLike) -> MotionError:
 
 def _measure_track(track: Track) -> Track:
     """``track`` with its floor and its centers, from one pass over all frames."""
-    shown = track.body.shown
+    shown = track.body.drawn_nodes
     lows, centers = [], []
     for _, places in track.blocks():
         for nodes in places[:, shown]:

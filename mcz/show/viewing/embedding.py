@@ -22,7 +22,7 @@ from mcz.kinematics.metrics.diff_document import diff_document
 from mcz.model.extras import annex_bytes
 from mcz.model.text_format import brief
 from mcz.model.types import JsonObject, Params, Target
-from mcz.show.viewing.file_registry import FACTS, Shelf, Shelved
+from mcz.show.viewing.file_registry import FACTS, FileRegistry, RegisteredFile
 from mcz.show.viewing.page import Page
 
 MOST_BYTES = 50 * 2**20  # of a page, by default: accepted by mail and browsers
@@ -74,24 +74,24 @@ class PageWritten:
 
 def write_page(
     page: Page,
-    shelf: Shelf,
+    registry: FileRegistry,
     target: Target,
     options: PageOptions,
     *,
     most: int = MOST_BYTES,
     force: bool = False,
 ) -> PageWritten:
-    """Write ``page`` with the files of ``shelf`` in it.
+    """Write ``page`` with the files of ``registry`` in it.
 
     The page is complete under the target's name, or not there. Raises LimitError if it would have
     more than ``most`` bytes, and MczError for files that cannot be read, cut or coded so.
     """
-    given = [file for _, file in shelf.given()]
+    given = [file for _, file in registry.initial_files()]
     inputs = [file.source for file in given]
     with replacing(target, force=force, inputs=inputs) as stream, ExitStack() as stack:
         contents, left = {}, most
         for number, file in enumerate(given):
-            data = _bytes_of(file, shelf, options, left)
+            data = _bytes_of(file, registry, options, left)
             left -= len(data) * 4 // 3
             contents[number] = data, stack.enter_context(_file(data, options.max_decoded))
         files = [file for _, file in contents.values()]
@@ -104,7 +104,7 @@ def write_page(
         }
         if len(files) > 1:
             names = [file.name for file in given]
-            document["diffs"] = list(_differences(files, names, shelf))
+            document["diffs"] = list(_differences(files, names, registry))
         whole = (page.before + element(document) + page.after).encode()
         if len(whole) > most:
             raise _too_large(given[-1].name, most)
@@ -133,17 +133,19 @@ def _file(data: bytes, max_decoded: int | None) -> File:
         return mcz_open(data, salvage=True, max_decoded=max_decoded)
 
 
-def _bytes_of(file: Shelved, shelf: Shelf, options: PageOptions, most: int) -> bytes:
+def _bytes_of(
+    file: RegisteredFile, registry: FileRegistry, options: PageOptions, most: int
+) -> bytes:
     """The bytes of an ``.mcz`` for the page; raises LimitError beyond ``most``."""
     target = file.target()
     if options.is_coded:
-        return _coded(target, shelf, options)
-    facts = ", ".join(fact for fact in FACTS if shelf.said.get(fact) is not None)
+        return _coded(target, registry, options)
+    facts = ", ".join(fact for fact in FACTS if registry.facts.get(fact) is not None)
     if facts and file.kind == "mcz":
         text = f"{file.name}: copied as it is, without the {facts} that you give"
-        shelf.say(with_hint(text, Hint.NAME_CODEC, shelf.hints))
+        registry.report(with_hint(text, Hint.NAME_CODEC, registry.hints))
     if options.is_cut:
-        return _cut(target, shelf, options)
+        return _cut(target, registry, options)
     contents = file.open()
     try:
         if contents.size * 4 // 3 > most:
@@ -153,7 +155,7 @@ def _bytes_of(file: Shelved, shelf: Shelf, options: PageOptions, most: int) -> b
         contents.close()
 
 
-def _cut(target: str, shelf: Shelf, options: PageOptions) -> bytes:
+def _cut(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
     """Some clips of a file, copied as they are stored."""
     from mcz.files.editing.extraction import extract
 
@@ -163,14 +165,14 @@ def _cut(target: str, shelf: Shelf, options: PageOptions) -> bytes:
         out,
         clip=options.clips or None,
         where=options.where,
-        salvage=shelf.salvage,
+        salvage=registry.salvage,
         max_decoded=options.max_decoded,
         copies=False,
     )
     return out.getvalue()
 
 
-def _coded(target: str, shelf: Shelf, options: PageOptions) -> bytes:
+def _coded(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
     from mcz.container.writer import Writer
     from mcz.files.writing.planning import prepare, under_its_path
     from mcz.files.writing.tuning import write_motion
@@ -180,17 +182,19 @@ def _coded(target: str, shelf: Shelf, options: PageOptions) -> bytes:
         options.params or {},
     )
     out = io.BytesIO()
-    with mcz_open(target, salvage=shelf.salvage, max_decoded=options.max_decoded) as file:
+    with mcz_open(target, salvage=registry.salvage, max_decoded=options.max_decoded) as file:
         writer = Writer(out, profile=file.container.profile)
         for clip in file.chosen(options.clips or None, options.where):
-            motion = shelf.with_facts(clip.motion())
+            motion = registry.with_facts(clip.motion())
             prepared = prepare(motion, codec, params, (under_its_path(motion.skeleton),))
             write_motion(writer, prepared, codec, params)
         writer.finish()
     return out.getvalue()
 
 
-def _differences(files: Sequence[File], names: Sequence[str], shelf: Shelf) -> Iterator[JsonObject]:
+def _differences(
+    files: Sequence[File], names: Sequence[str], registry: FileRegistry
+) -> Iterator[JsonObject]:
     """Yield ``mcz diff --by-joint --json`` of every other file against the first."""
     first, *others = files
     for other, name in zip(others, names[1:], strict=True):
@@ -200,11 +204,11 @@ def _differences(files: Sequence[File], names: Sequence[str], shelf: Shelf) -> I
         entries, notes = [], []
         for a, b in pairs[:MOST_COMPARED]:
             try:
-                original = shelf.with_facts(first.clips[a].motion())
-                coded = shelf.with_facts(other.clips[b].motion())
+                original = registry.with_facts(first.clips[a].motion())
+                coded = registry.with_facts(other.clips[b].motion())
                 entries.append(diff_document(original, coded, by_joint=True))
             except MczError as error:
-                notes.append(f"{a}: {error.describe(shelf.hints)}")
+                notes.append(f"{a}: {error.describe(registry.hints)}")
         yield {"a": names[0], "b": name, "clips": entries, "notes": notes}
 
 

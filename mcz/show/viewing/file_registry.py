@@ -22,12 +22,12 @@ from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import PYTHON_HINTS, Words, worded
 from mcz.model.motion import Motion
 from mcz.model.types import Params
-from mcz.show.viewing.requests import Contents, FarAway, OnDisk
+from mcz.show.viewing.requests import Contents, FileContents, RemoteContents
 from mcz.sources import FORMATS, wants_skeleton
 from mcz.sources.text.bones import skeletons_around
 
-Say = Callable[[str], None]
-Make = Callable[[BinaryIO], None]  # writes an .mcz
+Report = Callable[[str], None]
+WriteMcz = Callable[[BinaryIO], None]  # writes an .mcz
 
 MOST_RESULTS = 16  # files converted from a clip in view: the oldest is deleted for a new one
 MOST_UPLOADS = 256  # files that the page gave
@@ -36,8 +36,8 @@ FACTS = ("rate", "unit", "up")  # facts that files may lack
 SCAN_FACTOR = 10  # a folder is scanned again after so many times the duration of the last scan
 
 
-class Shelved(Protocol):
-    """A file on the shelf: ``kind`` is the format of the given file, such as "mcz" or "bvh"."""
+class RegisteredFile(Protocol):
+    """A file of a registry: ``kind`` is the format of the given file, such as "mcz" or "bvh"."""
 
     name: str
     kind: str
@@ -74,7 +74,7 @@ class Stored:
         return str(self.path)
 
     def open(self) -> Contents:
-        return OnDisk(self.path)
+        return FileContents(self.path)
 
 
 class Remote:
@@ -99,21 +99,23 @@ class Remote:
         with self._lock:
             if self._source is None:
                 self._source = open_bytes(self.source)
-        return FarAway(self._source, self._tag)
+        return RemoteContents(self._source, self._tag)
 
 
 class Converted:
     """An ``.mcz`` that is made from ``source`` on first use, and when that changes."""
 
-    def __init__(self, shelf: Shelf, name: str, kind: str, source: Path, make: Make) -> None:
+    def __init__(
+        self, registry: FileRegistry, name: str, kind: str, source: Path, write_mcz: WriteMcz
+    ) -> None:
         self.name, self.kind = name, kind
         self.source = str(source)
-        self._shelf, self._make = shelf, make
+        self._registry, self._write_mcz = registry, write_mcz
         self._lock = Lock()
         self._stored: Stored | None = None
         self._error: MczError | None = None
-        self._made_of: object = None
-        self._next_look = 0.0  # monotonic seconds
+        self._source_state: object = None
+        self._next_check = 0.0  # monotonic seconds
 
     @property
     def size(self) -> int | None:
@@ -121,38 +123,38 @@ class Converted:
 
     def target(self) -> str:
         with self._lock:
-            if time.monotonic() >= self._next_look:
-                self._look()
+            if time.monotonic() >= self._next_check:
+                self._refresh()
         if self._error is not None:
             raise self._error
         assert self._stored is not None
         return self._stored.target()
 
-    def _look(self) -> None:
+    def _refresh(self) -> None:
         """Convert it again if its source has changed; raises AccessError."""
         began = time.monotonic()
-        now = _state(Path(self.source), self._shelf.said.get("skeleton"))
+        now = _state(Path(self.source), self._registry.facts.get("skeleton"))
         took = time.monotonic() - began
-        if self._made_of != now:
+        if self._source_state != now:
             self._run()
-            self._made_of = now
+            self._source_state = now
         if self.kind == "folder":  # pages ask for many ranges, and folders may be large
-            self._next_look = time.monotonic() + SCAN_FACTOR * took
+            self._next_check = time.monotonic() + SCAN_FACTOR * took
 
     def _run(self) -> None:
         before, self._stored, self._error = self._stored, None, None
         try:
-            self._stored = Stored(self.name, self._shelf.write(self._make))
+            self._stored = Stored(self.name, self._registry.write(self._write_mcz))
         except MczError as error:
             error.add(path=self.source)
             self._error = error
-            self._shelf.say(error.describe(self._shelf.hints))
+            self._registry.report(error.describe(self._registry.hints))
         if before is not None:
             with suppress(OSError):
                 before.path.unlink()
 
     def open(self) -> Contents:
-        return OnDisk(self.target())
+        return FileContents(self.target())
 
 
 def _state(path: Path, skeleton: object = None) -> object:
@@ -184,60 +186,60 @@ def _stamp(path: Path) -> tuple[int, int, int] | None:
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 
-class Shelf:
+class FileRegistry:
     """Files by number, and a temporary folder of converted ones, deleted by ``close``.
 
-    ``said`` are facts that files lack: arguments of ``mcz.encode`` such as ``unit``. ``say`` gets a
-    line for each failed conversion. ``salvage``: damaged files are read. ``hints`` words the hints
-    of errors.
+    ``facts`` are those that files lack: arguments of ``mcz.encode`` such as ``unit``. ``report``
+    gets a line for each failed conversion. ``salvage``: damaged files are read. ``hints`` words
+    the hints of errors.
     """
 
     def __init__(
         self,
-        said: Params | None = None,
-        say: Say | None = None,
+        facts: Params | None = None,
+        report: Report | None = None,
         *,
         salvage: bool = False,
         hints: Words = PYTHON_HINTS,
     ) -> None:
         self.hints = hints
-        self.said, self.salvage = dict(said or {}), salvage
-        self.say: Say = say or (lambda line: None)
+        self.facts, self.salvage = dict(facts or {}), salvage
+        self.report: Report = report or (lambda line: None)
         self._folder: Path | None = None
-        self._files: dict[int, Shelved] = {}
+        self._files: dict[int, RegisteredFile] = {}
         self._n_given = self._n_uploads = self._next = self._n_written = 0
         self._results: deque[int] = deque()
         self._lock = RLock()
         self._is_closed = False
 
-    def __getitem__(self, number: int) -> Shelved:
+    def __getitem__(self, number: int) -> RegisteredFile:
         """The file of that number; raises KeyError."""
         with self._lock:
             return self._files[number]
 
     def with_facts(self, motion: Motion) -> Motion:
         """``motion`` with the facts that its file lacks; raises OptionError."""
-        rate, unit, up = map(self.said.get, FACTS)
+        rate, unit, up = map(self.facts.get, FACTS)
         options = SourceOptions(rate=rate, unit=unit, up=up)
         return options.completing(motion)
 
-    def given(self) -> list[tuple[int, Shelved]]:
+    def initial_files(self) -> list[tuple[int, RegisteredFile]]:
         """The initial files, with their numbers."""
         with self._lock:
             return list(self._files.items())[: self._n_given]
 
-    def give(self, file: Shelved) -> None:
+    def add_initial(self, file: RegisteredFile) -> None:
         """Add an initial file."""
         with self._lock:
             self._n_given += 1
             self._add(file)
 
-    def _add(self, file: Shelved) -> int:
+    def _add(self, file: RegisteredFile) -> int:
         number, self._next = self._next, self._next + 1
         self._files[number] = file
         return number
 
-    def upload(self, name: str, kind: str, make: Make) -> tuple[int, Stored]:
+    def upload(self, name: str, kind: str, write_mcz: WriteMcz) -> tuple[int, Stored]:
         """Make an ``.mcz`` from an upload; raises LimitError for too many."""
         with self._lock:
             if self._n_uploads >= MOST_UPLOADS:
@@ -245,13 +247,13 @@ class Shelf:
                     f"the limit of {MOST_UPLOADS} files is reached; start mcz view again"
                 )
             self._n_uploads += 1
-        stored = Stored(name, self.write(make), kind)
+        stored = Stored(name, self.write(write_mcz), kind)
         with self._lock:
             return self._add(stored), stored
 
-    def result(self, name: str, make: Make) -> tuple[int, Stored]:
+    def result(self, name: str, write_mcz: WriteMcz) -> tuple[int, Stored]:
         """Make an ``.mcz`` from a clip in view; the oldest of ``MOST_RESULTS`` is deleted."""
-        stored = Stored(name, self.write(make))
+        stored = Stored(name, self.write(write_mcz))
         with self._lock:
             number = self._add(stored)
             self._results.append(number)
@@ -262,14 +264,14 @@ class Shelf:
                     old.path.unlink()
         return number, stored
 
-    def write(self, make: Make) -> Path:
-        """A new file of the temporary folder, written by ``make``."""
+    def write(self, write_mcz: WriteMcz) -> Path:
+        """A new file of the temporary folder, written by ``write_mcz``."""
         with self._lock:
             path = self.folder() / f"{self._n_written}{MCZ}"
             self._n_written += 1
         try:
             with path.open("xb+") as stream:
-                make(stream)
+                write_mcz(stream)
         except BaseException:
             with suppress(OSError):
                 path.unlink()
@@ -285,7 +287,7 @@ class Shelf:
                 self._folder = Path(tempfile.mkdtemp(prefix="mcz-view-"))
             return self._folder
 
-    def spare_folder(self) -> Path:
+    def new_folder(self) -> Path:
         """A new folder below the temporary one, for files that are made into an ``.mcz``."""
         return Path(tempfile.mkdtemp(dir=self.folder(), prefix="given-"))
 
@@ -302,29 +304,31 @@ class Shelf:
                 time.sleep(0.05)
 
 
-def put(shelf: Shelf, path: str) -> None:
-    """Put a file, a folder or a URL on the shelf; raises AccessError or OptionError.
+def add_path(registry: FileRegistry, path: str) -> None:
+    """Add a file, a folder or a URL; raises AccessError or OptionError.
 
     Of a folder these are its ``.mcz`` files, and one archive of all its other motion files.
     """
     if "://" in path:
         if not path.partition("?")[0].lower().endswith(MCZ):
             raise OptionError("a remote file must be an .mcz", path=path)
-        shelf.give(Remote(path))
+        registry.add_initial(Remote(path))
         return
     place = Path(path)
     if path and place.is_dir():
-        _put_folder(shelf, place)
+        _add_folder(registry, place)
         return
     if not (path and place.is_file()):
         text = "not a file" if path and place.exists() else "no such file"
         raise AccessError(text, path=path or repr(path))
     kind = kind_of(place)
     if kind == "mcz":
-        shelf.give(Stored(place.name, place))
+        registry.add_initial(Stored(place.name, place))
     else:
-        shelf.give(
-            Converted(shelf, place.name, kind, place, lambda out: encode(place, out, shelf.said))
+        registry.add_initial(
+            Converted(
+                registry, place.name, kind, place, lambda out: encode(place, out, registry.facts)
+            )
         )
 
 
@@ -348,30 +352,32 @@ def encode(source: Path, out: BinaryIO, facts: Params) -> None:
     encode(source, out, **{**facts, "skeleton": skeleton})
 
 
-def _put_folder(shelf: Shelf, folder: Path) -> None:
+def _add_folder(registry: FileRegistry, folder: Path) -> None:
     from mcz.files.editing.folders import files_below, motion_files
 
     paths, _ = files_below(folder, None)
     for path in paths:
         if path.suffix.lower() == MCZ:
-            shelf.give(Stored(path.relative_to(folder).as_posix(), path))
+            registry.add_initial(Stored(path.relative_to(folder).as_posix(), path))
     motions, _ = motion_files(paths)
     if motions:
         name = folder.resolve().name or "motions"
-        shelf.give(Converted(shelf, name, "folder", folder, lambda out: pack(folder, out, shelf)))
-    elif not shelf.given():
+        registry.add_initial(
+            Converted(registry, name, "folder", folder, lambda out: pack(folder, out, registry))
+        )
+    elif not registry.initial_files():
         raise OptionError("the folder contains no motion file", path=folder)
 
 
-def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
+def pack(folder: Path, out: BinaryIO, registry: FileRegistry) -> None:
     """Write all motion files below ``folder`` as one ``.mcz``; unreadable ones are reported."""
     from mcz.files.editing.archive import pack
     from mcz.model import threads
 
-    facts = {key: value for key, value in shelf.said.items() if key != "skeleton"}
+    facts = {key: value for key, value in registry.facts.items() if key != "skeleton"}
     report = pack(folder, out, jobs=threads.processors(), copies=False, **facts)
     for outcome in report.outcomes:
         if outcome.result == "failed":
-            shelf.say(worded(outcome.message, shelf.hints))
+            registry.report(worded(outcome.message, registry.hints))
     if not any(outcome.result == "parsed" for outcome in report.outcomes):
         raise OptionError("none of its motion files is readable", path=folder)

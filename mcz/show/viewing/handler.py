@@ -74,7 +74,7 @@ class Handler(BaseHTTPRequestHandler):
         except Refused as refused:
             self._fail(refused.status, "Refused", str(refused))
         except MczError as error:
-            self._fail(422, type(error).__name__, error.describe(self._site.shelf.hints))
+            self._fail(422, type(error).__name__, error.describe(self._site.registry.hints))
         except MemoryError:
             self._fail(507, "MemoryError", "out of memory")
 
@@ -110,7 +110,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def _file(self, number: int) -> None:
         try:
-            file = self._site.shelf[number]
+            file = self._site.registry[number]
         except KeyError:
             raise Refused(404, "there is no such file, or no longer") from None
         with closing(file.open()) as contents:

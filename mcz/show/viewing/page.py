@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mcz.container.source import lock
 from mcz.errors import AccessError, FormatError, reason_of
-from mcz.show.viewing.file_registry import Say
+from mcz.show.viewing.file_registry import Report
 
 PACKAGED = Path(__file__).with_name("viewer.html")  # in a wheel that was built with it
 OTHER = "MCZ_VIEWER_PAGE"  # an environment variable: a page to use instead of ours
@@ -37,7 +37,7 @@ class Page:
         self.before, self.after, self.policy = before, after, policy[1]
 
 
-def page(say: Say | None = None) -> Page:
+def page(say: Report | None = None) -> Page:
     """The page of this installation; in a source checkout it is built if outdated.
 
     ``say`` gets a line for slow steps. Raises AccessError if there is none; the message explains

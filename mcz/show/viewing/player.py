@@ -27,7 +27,7 @@ from mcz.kinematics.retargeting.sides import sides_of
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.skeleton import column_of, signs_of
 from mcz.model.text_format import counted, shown
-from mcz.show.viewing.file_registry import Shelf, Shelved
+from mcz.show.viewing.file_registry import FileRegistry, RegisteredFile
 from mcz.show.viewing.page import OTHER, Page, page
 
 MOST_BYTES = 300_000
@@ -54,14 +54,14 @@ def _player(moving: Moving) -> str:
     rate = float(moving.frame_rate or UNKNOWN_RATE)
     n_points = len(lines.sides)
     nothing = np.empty((0, n_points, 3), "<i2")
-    empty = Drawn(nothing, 1.0, frames_read(moving), frames_read(moving), 0, 0.0, 0.0)
+    empty = PointSamples(nothing, 1.0, frames_read(moving), frames_read(moving), 0, 0.0, 0.0)
     room = MOST_BYTES - SPARE - len(_frame(moving, lines, empty, rate))
     most = room * 3 // 4 // (6 * n_points + TIME_BYTES)
-    drawing = drawn(moving, max(1, most), max(1, int(rate // RATE)))
+    drawing = sample_points(moving, max(1, most), max(1, int(rate // RATE)))
     return _frame(moving, lines, drawing, rate)
 
 
-def _frame(moving: Moving, lines: Figure, drawing: Drawn, rate: float) -> str:
+def _frame(moving: Moving, lines: Figure, drawing: PointSamples, rate: float) -> str:
     document = {
         "caption": _caption(moving, drawing),
         "positions": base64.b64encode(drawing.words.tobytes()).decode(),
@@ -85,7 +85,7 @@ def _frame(moving: Moving, lines: Figure, drawing: Drawn, rate: float) -> str:
     )
 
 
-def _times(moving: Moving, drawing: Drawn) -> list[float] | None:
+def _times(moving: Moving, drawing: PointSamples) -> list[float] | None:
     """The times of the drawn frames to a millisecond, None where they are unknown."""
     if moving.timeline is None:
         return None
@@ -93,7 +93,7 @@ def _times(moving: Moving, drawing: Drawn) -> list[float] | None:
     return [round(float(time), 3) for time in times]
 
 
-def _caption(moving: Moving, drawing: Drawn) -> str:
+def _caption(moving: Moving, drawing: PointSamples) -> str:
     rate = moving.frame_rate
     text = f"{shown(moving.name)}: {counted(moving.n_frames, 'frame')}"
     text += " at an unknown rate" if rate is None else f" at {float(rate):g} Hz"
@@ -129,7 +129,7 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class PointSamples:
     """Words of (frames, points, 3), each ``step`` length units from the middle of the scene.
 
     Every ``every``-th of the first ``n_read`` frames. ``floor`` is the lowest coordinate along the
@@ -155,7 +155,7 @@ def figure(skeleton: Skeleton) -> Figure:
     return Figure(lines_of(skeleton), [sides[joint] for joint, _ in points])
 
 
-def drawn(moving: Moving, most_frames: int, every: int = 1) -> Drawn:
+def sample_points(moving: Moving, most_frames: int, every: int = 1) -> PointSamples:
     """At most ``most_frames`` frames of a Motion or Clip; raises MczError for one without points.
 
     ``every`` is the least distance of two of them.
@@ -171,7 +171,9 @@ def drawn(moving: Moving, most_frames: int, every: int = 1) -> Drawn:
     up = column_of(axis)
     known = places[np.isfinite(places).all(axis=2)] - middle
     floor = float(known[:, up].min(initial=0.0))
-    return Drawn(words, step, every, n_read, up, floor, float(np.abs(known).max(initial=0.0)))
+    return PointSamples(
+        words, step, every, n_read, up, floor, float(np.abs(known).max(initial=0.0))
+    )
 
 
 def frames_read(moving: Moving) -> int:
@@ -238,27 +240,27 @@ TEMPLATE = """<!doctype html>
 """
 
 
-def viewer_page(shelf: Shelf) -> Page:
+def viewer_page(registry: FileRegistry) -> Page:
     """Return the viewer's page, or a small one if this installation has none.
 
-    ``shelf.say`` gets the reason. Raises AccessError if the environment names a missing page.
+    ``registry.report`` gets the reason. Raises AccessError if the environment names a missing page.
     """
     try:
-        return page(shelf.say)
+        return page(registry.report)
     except AccessError as error:
         if os.environ.get(OTHER):
             raise
-        reason = error.describe(shelf.hints)
-        shelf.say(f"{reason}; the small player is shown instead")
-        return small_page(shelf, reason)
+        reason = error.describe(registry.hints)
+        registry.report(f"{reason}; the small player is shown instead")
+        return small_page(registry, reason)
 
 
-def small_page(shelf: Shelf, reason: str) -> Page:
+def small_page(registry: FileRegistry, reason: str) -> Page:
     """Return a page with a player of each clip, ``MOST_CLIPS`` of them at most."""
     notice = f"This is the small player: it only plays. {reason[:1].upper()}{reason[1:]}."
     players: list[str] = []
-    for _, file in shelf.given():
-        for text in _players(file, shelf):
+    for _, file in registry.initial_files():
+        for text in _players(file, registry):
             if len(players) == MOST_CLIPS:
                 notice += f" The first {MOST_CLIPS} clips are shown."
                 return _page(notice, players)
@@ -270,10 +272,10 @@ def _page(notice: str, players: list[str]) -> Page:
     return Page(TEMPLATE.format(notice=html.escape(notice), players="\n".join(players)))
 
 
-def _players(file: Shelved, shelf: Shelf) -> Iterator[str]:
+def _players(file: RegisteredFile, registry: FileRegistry) -> Iterator[str]:
     """Yield the player of each clip of a file, or the reason why it has none."""
     try:
-        with mcz_open(file.target(), salvage=shelf.salvage) as opened:
+        with mcz_open(file.target(), salvage=registry.salvage) as opened:
             yield from map(player, opened)
     except MczError as error:
-        yield f"<pre>{html.escape(error.describe(shelf.hints))}</pre>"
+        yield f"<pre>{html.escape(error.describe(registry.hints))}</pre>"

@@ -275,7 +275,7 @@ class Contents(Protocol):
     def close(self) -> None: ...
 
 
-class OnDisk:
+class FileContents:
     """A file on this machine; its tag changes whenever the file is written to or replaced."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -297,7 +297,7 @@ class OnDisk:
         self._stream.close()
 
 
-class FarAway:
+class RemoteContents:
     """A file behind a URL, read by ranges; it does not change while open."""
 
     def __init__(self, source: ByteSource, tag: str) -> None:

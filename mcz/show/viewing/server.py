@@ -13,10 +13,10 @@ from threading import BoundedSemaphore, Thread
 from typing import Any
 
 from mcz.errors import AccessError, OptionError, reason_of
-from mcz.show.viewing.file_registry import Shelf
+from mcz.show.viewing.file_registry import FileRegistry
 from mcz.show.viewing.handler import Handler
 from mcz.show.viewing.page import Page
-from mcz.show.viewing.server_tasks import Site, Visitors, Work, lossy_codecs
+from mcz.show.viewing.server_tasks import ServerTasks, Site, Visitors, lossy_codecs
 
 GRACE = 5.0  # seconds in which a page may come back, such as on a reload
 MOST_CONNECTIONS = 128
@@ -24,7 +24,7 @@ HOSTS = {"127.0.0.1": "127.0.0.1", "localhost": "127.0.0.1", "::1": "::1"}
 
 
 class Server(ThreadingHTTPServer):
-    """Serves ``page`` and the files of ``shelf`` from a thread until it is closed; a context.
+    """Serves ``page`` and the files of ``registry`` from a thread until it is closed; a context.
 
     ``host`` is a name of this machine (127.0.0.1, localhost, ::1), ``port`` 0 any free one. Raises
     OptionError for another host, AccessError if the port is not available.
@@ -38,7 +38,7 @@ class Server(ThreadingHTTPServer):
     def __init__(
         self,
         page: Page,
-        shelf: Shelf,
+        registry: FileRegistry,
         *,
         host: str = "127.0.0.1",
         port: int = 0,
@@ -50,8 +50,8 @@ class Server(ThreadingHTTPServer):
         self.address_family = socket.AF_INET6 if ":" in HOSTS[host] else socket.AF_INET
         self.site = Site(
             page,
-            shelf,
-            Work(shelf),
+            registry,
+            ServerTasks(registry),
             Visitors(GRACE if grace is None else grace),
             secrets.token_urlsafe(24),
         )
@@ -85,7 +85,7 @@ class Server(ThreadingHTTPServer):
             self.shutdown()
             self.server_close()
         self._thread.join()
-        self.site.shelf.close()
+        self.site.registry.close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Answer in a new thread, or not at all if there are too many."""

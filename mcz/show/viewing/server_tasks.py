@@ -25,7 +25,7 @@ from mcz.files.reading.file import open as mcz_open
 from mcz.files.reading.source_files import SourceOptions
 from mcz.model.motion import Motion
 from mcz.model.types import JsonObject, Params
-from mcz.show.viewing.file_registry import Shelf, Shelved, encode, kind_of, pack
+from mcz.show.viewing.file_registry import FileRegistry, RegisteredFile, encode, kind_of, pack
 from mcz.show.viewing.page import Page
 from mcz.show.viewing.requests import (
     Readable,
@@ -40,20 +40,20 @@ from mcz.sources import FORMATS
 
 MOST_POSTED = 2**30  # bytes of the files of an upload
 MOST_WAITING = 8  # requests that wait for their turn
-MOST_HELD, HELD_BYTES = 2, 2**28  # decoded motions that are at hand, and bytes of each at most
+MOST_CACHED, CACHED_BYTES = 2, 2**28  # decoded motions that are at hand, and bytes of each at most
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
 OWN_BASES = "basis"  # the only parameter that may name a file
 
 
-class Work:
+class ServerTasks:
     """The tasks of a server, one at a time: each of them uses all processors."""
 
     most_posted = MOST_POSTED
 
-    def __init__(self, shelf: Shelf) -> None:
-        self._shelf = shelf
+    def __init__(self, registry: FileRegistry) -> None:
+        self._registry = registry
         self._turn, self._waiting = Lock(), BoundedSemaphore(MOST_WAITING)
-        self._held: deque[tuple[object, Motion]] = deque(maxlen=MOST_HELD)
+        self._cached: deque[tuple[object, Motion]] = deque(maxlen=MOST_CACHED)
 
     @contextmanager
     def turn(self, is_gone: Callable[[], bool] = lambda: False) -> Iterator[None]:
@@ -73,8 +73,8 @@ class Work:
         return {
             "version": import_module("mcz").__version__,
             "files": self.files(),
-            "diff": len(self._shelf.given()) == 2,
-            "salvage": self._shelf.salvage,
+            "diff": len(self._registry.initial_files()) == 2,
+            "salvage": self._registry.salvage,
             "codecs": lossy_codecs(),
             "canEncode": True,
             "canConvert": True,
@@ -86,13 +86,13 @@ class Work:
         """The initial files; the size of one that is not converted yet is None."""
         return [
             {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
-            for number, file in self._shelf.given()
+            for number, file in self._registry.initial_files()
         ]
 
     def convert(self, stream: Readable, size: int, content_type: str) -> JsonObject:
         """Make an ``.mcz`` of the files of a form; of several motions one archive."""
         boundary = boundary_of(content_type)
-        folder = self._shelf.spare_folder()
+        folder = self._registry.new_folder()
         try:
             paths = save_files(stream, size, boundary, folder)
             with self.turn():
@@ -115,11 +115,11 @@ class Work:
             raise OptionError("an .mcz needs no conversion; the page reads it directly")
         if len(motions) == 1:
             name, kind = motions[0].name, kinds[0]
-            make = partial(encode, motions[0], facts=self._shelf.said)
+            make = partial(encode, motions[0], facts=self._registry.facts)
         else:
             name, kind = f"{len(motions)} files", "folder"
-            make = partial(pack, folder, shelf=self._shelf)
-        number, stored = self._shelf.upload(name, kind, make)
+            make = partial(pack, folder, registry=self._registry)
+        number, stored = self._registry.upload(name, kind, make)
         return {"url": url_of(number), "name": name, "size": stored.size}
 
     def encode(self, asked: Params) -> JsonObject:
@@ -140,7 +140,7 @@ class Work:
             quality.update(written.clips[0].quality or {})
 
         began = time.monotonic()
-        number, stored = self._shelf.result(f"{motion.name} ({codec})", make)
+        number, stored = self._registry.result(f"{motion.name} ({codec})", make)
         seconds = time.monotonic() - began
         with mcz_open(stored.target()) as file:
             payload = clip_sizes(file.container, file.only_clip()).payload
@@ -181,17 +181,17 @@ class Work:
         data: bytes = writer(self._motion(asked), rate=rate).data
         return data
 
-    def _file(self, asked: Params) -> Shelved:
+    def _file(self, asked: Params) -> RegisteredFile:
         match = re.fullmatch(r"files/([0-9]{1,9})", text_of(asked, "url"))
         try:
-            return self._shelf[int(match[1]) if match else -1]
+            return self._registry[int(match[1]) if match else -1]
         except KeyError:
             raise Refused(404, "there is no such file, or no longer") from None
 
     @contextmanager
     def _opened(self, asked: Params) -> Iterator[tuple[File, Clip]]:
         clip_key = asked.get("clip")
-        with mcz_open(self._file(asked).target(), salvage=self._shelf.salvage) as file:
+        with mcz_open(self._file(asked).target(), salvage=self._registry.salvage) as file:
             if isinstance(clip_key, int) and not isinstance(clip_key, bool):
                 if not 0 <= clip_key < len(file):
                     raise Refused(404, f"the file has {len(file)} clips, not {clip_key}")
@@ -206,14 +206,14 @@ class Work:
         file = self._file(asked)
         with closing(file.open()) as contents:
             key = (asked["url"], contents.tag, asked.get("clip"))
-        for cached_key, motion in self._held:
+        for cached_key, motion in self._cached:
             if cached_key == key:
                 return motion
         with self._opened(asked) as (_, clip):
             motion = clip.motion()
-        motion = self._shelf.with_facts(motion)
-        if sum(signal.values.nbytes for signal in motion.signals) <= HELD_BYTES:
-            self._held.append((key, motion))
+        motion = self._registry.with_facts(motion)
+        if sum(signal.values.nbytes for signal in motion.signals) <= CACHED_BYTES:
+            self._cached.append((key, motion))
         return motion
 
 
@@ -271,8 +271,8 @@ class Site:
     """The page, files and tasks below ``token``; ``port`` is that of the server."""
 
     page: Page
-    shelf: Shelf
-    work: Work
+    registry: FileRegistry
+    work: ServerTasks
     visitors: Visitors
     token: str
     port: int = 0

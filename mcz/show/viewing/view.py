@@ -13,7 +13,7 @@ from mcz.errors import OptionError
 from mcz.files.reading.clip import Clip
 from mcz.model.motion import Motion
 from mcz.model.types import JsonObject
-from mcz.show.viewing.file_registry import Shelf, Stored, put
+from mcz.show.viewing.file_registry import FileRegistry, Stored, add_path
 from mcz.show.viewing.player import player, viewer_page
 from mcz.show.viewing.server import Server
 
@@ -83,13 +83,13 @@ def view(
     options = {"skeleton": skeleton, **facts}
     if in_notebook():
         return View(None, [_player_of(thing, options, salvage) for thing in things])
-    shelf = Shelf(options, _tell, salvage=salvage)
+    registry = FileRegistry(options, _print_line, salvage=salvage)
     try:
         for thing in things:
-            _give(shelf, thing)
-        server = Server(viewer_page(shelf), shelf, port=port)
+            _add(registry, thing)
+        server = Server(viewer_page(registry), registry, port=port)
     except BaseException:
-        shelf.close()
+        registry.close()
         raise
     shown = View(server)
     if browser:
@@ -104,7 +104,7 @@ def in_notebook() -> bool:
     return getattr(shell, "kernel", None) is not None
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     sys.stderr.write(f"mcz: {line}\n")
 
 
@@ -123,13 +123,13 @@ def _player_of(thing: Thing, options: JsonObject, salvage: bool) -> str:
     raise OptionError("the file has no clip", path=thing)
 
 
-def _give(shelf: Shelf, thing: Thing) -> None:
+def _add(registry: FileRegistry, thing: Thing) -> None:
     if isinstance(thing, Motion):
-        shelf.give(Stored(thing.name, shelf.write(lambda out: _write(thing, out))))
+        registry.add_initial(Stored(thing.name, registry.write(lambda out: _write(thing, out))))
     elif isinstance(thing, Clip):
-        shelf.give(Stored(thing.name, shelf.write(lambda out: _copy(thing, out))))
+        registry.add_initial(Stored(thing.name, registry.write(lambda out: _copy(thing, out))))
     else:
-        put(shelf, os.fspath(thing))
+        add_path(registry, os.fspath(thing))
 
 
 def _write(motion: Motion, out: BinaryIO) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion.scenes.gltf import glb
-from mcz.exchange.conversion.scenes.keys import keyed
+from mcz.exchange.conversion.scenes.keys import find_keys
 from mcz.exchange.conversion.scenes.nodes import Scene, scene_of
 from mcz.exchange.conversion.scenes.usda import usda
 from mcz.files.reading.source_files import SourceOptions
@@ -75,9 +75,9 @@ def to_scene(
     scene = scene_of(motion)
     _check_size(scene)
     bound = 0.0 if to == "usda" else _bound(scene, key_error_mm)
-    keys = keyed(scene, bound)
+    keys = find_keys(scene, bound)
     scale = MM_PER_M if scene.has_unit else 1.0
-    reached = keys.reached
+    errors = keys.errors
     facts = {
         "source": motion.source.path if motion.source else motion.name,
         "frameRate": float(scene.rate),
@@ -86,17 +86,17 @@ def to_scene(
         "lengthUnitKnown": scene.has_unit,
         "upAxisKnown": bool(motion.skeleton.up_axis),
         "keyError": bound,
-        "maxError": reached.error,
+        "maxError": errors.error,
         "notes": list(scene.notes),
     }
     return SceneFile(
         WRITERS[to](scene, keys, GENERATOR, facts),
         bound * scale,
-        reached.error * scale,
-        reached.frame,
-        reached.point,
-        reached.n_keys,
-        reached.n_values,
+        errors.error * scale,
+        errors.frame,
+        errors.point,
+        errors.n_keys,
+        errors.n_values,
         scene.has_unit,
         scene.notes,
     )

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.exchange.conversion.scenes.keys import Keyed, Keys
+from mcz.exchange.conversion.scenes.keys import Keys, SceneKeys
 from mcz.exchange.conversion.scenes.nodes import (
     COLORS,
     MARKER,
@@ -50,7 +50,7 @@ UP_MATRICES = {
 }
 
 
-def glb(scene: Scene, keys: Keyed, generator: str, extras: JsonObject) -> bytes:
+def glb(scene: Scene, keys: SceneKeys, generator: str, extras: JsonObject) -> bytes:
     """The file; ``extras`` are facts about the motion, which are kept under "asset"."""
     return _Document(scene, keys).bytes(generator, extras)
 
@@ -58,7 +58,7 @@ def glb(scene: Scene, keys: Keyed, generator: str, extras: JsonObject) -> bytes:
 class _Document:
     """The parts of the file, as they are collected. Node 0 turns the up axis."""
 
-    def __init__(self, scene: Scene, keys: Keyed) -> None:
+    def __init__(self, scene: Scene, keys: SceneKeys) -> None:
         self.scene, self.keys = scene, keys
         self.buffer = bytearray()
         self.views: list[JsonObject] = []

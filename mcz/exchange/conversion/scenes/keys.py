@@ -55,20 +55,20 @@ class KeyErrors:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Keyed:
+class SceneKeys:
     """Keys of every node's turns and shifts; None for one that stays at rest."""
 
     turns: list[Keys | None]
     shifts: list[Keys | None]
-    reached: KeyErrors
+    errors: KeyErrors
 
 
-def keyed(scene: Scene, bound: float) -> Keyed:
+def find_keys(scene: Scene, bound: float) -> SceneKeys:
     """The keys of ``scene`` that keep every node within ``bound``; 0: a key in every frame.
 
     Raises OptionError where float32 numbers alone exceed it.
     """
-    return _Keyer(scene, bound).run()
+    return _KeySearch(scene, bound).run()
 
 
 @dataclass(slots=True, eq=False)
@@ -102,7 +102,7 @@ class _Channel:
         return out
 
 
-class _Keyer:
+class _KeySearch:
     def __init__(self, scene: Scene, bound: float) -> None:
         self.scene, self.bound, self.nodes = scene, bound, scene.nodes
         self.turns = list(map(self._turns, self.nodes, _levers(scene)))
@@ -120,7 +120,7 @@ class _Keyer:
             return None
         return _channel(node.shifts, SHARE * self.bound, node)
 
-    def run(self) -> Keyed:
+    def run(self) -> SceneKeys:
         """Choose keys until all nodes are within the bound."""
         times = self.scene.times
         for channel in self._channels():
@@ -139,10 +139,10 @@ class _Keyer:
                 )
             self._tighten(wrong, 0.0 if number == ROUNDS else TIGHTER)
             errors = self.errors()
-        return Keyed(
+        return SceneKeys(
             [self._keys(channel, NO_TURN) for channel in self.turns],
             [self._keys(c, n.rest) for c, n in zip(self.shifts, self.nodes, strict=True)],
-            self._reached(errors),
+            self._measure_errors(errors),
         )
 
     def _channels(self) -> Iterator[_Channel]:
@@ -198,7 +198,7 @@ class _Keyer:
         hang(above[0], above[1], turns, shifts, out_turns, out_places)
         return out_turns, out_places
 
-    def _reached(self, errors: Floats) -> KeyErrors:
+    def _measure_errors(self, errors: Floats) -> KeyErrors:
         channels = list(self._channels())
         n_keys = sum(len(channel.keys.frames) for channel in channels)
         n_values = len(self.scene.times) * len(channels)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.exchange.conversion.scenes.key_kernels import fill
-from mcz.exchange.conversion.scenes.keys import Keyed, Keys
+from mcz.exchange.conversion.scenes.keys import Keys, SceneKeys
 from mcz.exchange.conversion.scenes.nodes import COLORS, MARKER, SIDES, Node, Scene, Solid, solid_of
 from mcz.kinematics.chain import Floats
 from mcz.model.types import JsonObject
@@ -28,7 +28,7 @@ UP_TURNS = {  # degrees about x, y and z: that axis becomes y
 IDENTIFIER = re.compile(r"[^A-Za-z0-9_]")
 
 
-def usda(scene: Scene, keys: Keyed, generator: str, facts: JsonObject) -> bytes:
+def usda(scene: Scene, keys: SceneKeys, generator: str, facts: JsonObject) -> bytes:
     """The file, of keys in every frame; ``facts`` about the motion are kept with the layer."""
     name = identifiers([scene.name])[0]
     body = _markers(scene, keys) if scene.is_markers else _skeleton(scene, keys, name)
@@ -75,7 +75,7 @@ def _turned_up(scene: Scene) -> Iterator[str]:
         yield 'uniform token[] xformOpOrder = ["xformOp:rotateXYZ"]'
 
 
-def _markers(scene: Scene, keys: Keyed) -> Iterator[str]:
+def _markers(scene: Scene, keys: SceneKeys) -> Iterator[str]:
     names = identifiers([node.name for node in scene.nodes])
     for name, node, shifts in zip(names, scene.nodes, keys.shifts, strict=True):
         yield f"def Sphere {quoted(name)} ("
@@ -102,7 +102,7 @@ def _visibility(scene: Scene, node: Node) -> Iterator[str]:
     yield from _samples("token visibility", scene, frames, words)
 
 
-def _skeleton(scene: Scene, keys: Keyed, name: str) -> Iterator[str]:
+def _skeleton(scene: Scene, keys: SceneKeys, name: str) -> Iterator[str]:
     paths, count = _paths(scene), len(scene.nodes)
     binds = np.tile(np.eye(4), (count, 1, 1))
     binds[:, 3, :3] = scene.rest_places
@@ -127,7 +127,7 @@ def _skeleton(scene: Scene, keys: Keyed, name: str) -> Iterator[str]:
 
 
 def _animation(
-    scene: Scene, keys: Keyed, paths: Sequence[str], moving: Sequence[int]
+    scene: Scene, keys: SceneKeys, paths: Sequence[str], moving: Sequence[int]
 ) -> Iterator[str]:
     frames = np.arange(len(scene.times))
     shifts = [_dense(keys.shifts[k], scene.nodes[k].rest, scene.times) for k in moving]
