@@ -18,9 +18,9 @@
         ├── LimitError       they ask for more than the reader is willing to give
         └── LostFrameError   they need a frame that did not come
 
-An error has fields, see ``MczError``; ``str(error)`` is made of them. Code that knows more of the
-place adds it on the way out, by ``error.add`` or ``error_context``. What is no error but should be
-known is a warning: SkeletonWarning, ContactWarning.
+An error has fields, see ``MczError``; ``str(error)`` is made of them. Code that knows more
+about the place adds it on the way out, with ``error.add`` or ``error_context``. Problems that are
+not errors are warnings: SkeletonWarning, ContactWarning.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ class ContactWarning(UserWarning):
 
 
 def remark_of(error: MczError | OSError, **fields: Unpack[Fields]) -> Remark:
-    """The text of an error as part of a report; ``fields`` as of ``MczError.add``."""
+    """The text of an error as part of a report; ``fields`` as in ``MczError.add``."""
     if isinstance(error, OSError):
         error = MczError(reason_of(error), path=error.filename)
     error.add(**fields)

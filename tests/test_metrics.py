@@ -17,7 +17,7 @@ import mcz
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, codecs
 from mcz.codecs.contract import Encoded, Segment
 from mcz.files.writing.quality import LEFT_OUT, quality_entries
-from mcz.kinematics.angles import Unwrapper, turns, unwrap
+from mcz.kinematics.angles import Unwrapper, unwrap, whole_turns
 from tests import overlap_codec
 from tests.motions import POSITIONS, motions, skeleton, smooth, write_bytes
 
@@ -308,7 +308,7 @@ def test_unwrapping_leaves_the_rest_alone() -> None:
     np.testing.assert_array_equal(unwrap(values, unknown), values)
     own = [Channel("", "a")] * 10
     np.testing.assert_array_equal(unwrap(values, skeleton(), own), values)
-    assert turns(np.array([180.0, -180.0, 180.0 + 2**-45]), 360.0).tolist() == [0, 0, 1]
+    assert whole_turns(np.array([180.0, -180.0, 180.0 + 2**-45]), 360.0).tolist() == [0, 0, 1]
 
 
 # The quality record

@@ -24,7 +24,7 @@ from mcz.files.reading.report import info
 from mcz.files.reading.sizes import byte_shares, layout
 from mcz.kinematics.metrics.joint_errors import joint_errors
 from mcz.show.pictures.channel_charts import density
-from mcz.show.pictures.charts import MOST_POINTS, STYLE, ChartPage, Sheet, number, thinned
+from mcz.show.pictures.charts import MOST_POINTS, STYLE, ChartPage, Sheet, number, thin_line
 from mcz.show.pictures.error_charts import errors_between
 from mcz.show.pictures.plotting import KINDS
 from tests.commands import run
@@ -214,7 +214,7 @@ def test_a_sine_is_at_its_frequency(tmp_path: Path) -> None:
 )
 def test_a_thinned_line_has_its_ends(pieces: list[float], times: int) -> None:
     y = np.repeat(np.array(pieces), times)
-    x, found = thinned(np.arange(len(y), dtype=float), y)
+    x, found = thin_line(np.arange(len(y), dtype=float), y)
     assert len(found) <= MOST_POINTS + 2
     assert (np.diff(x) >= 0).all()
     if np.isfinite(y).any():

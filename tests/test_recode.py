@@ -242,11 +242,11 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "--recode re-encodes them" in capsys.readouterr().err
     assert not part.exists()
     assert run("extract", whole, part, "--joints", "knee", "--recode") == 0
-    assert "joints knee, coded anew, data" in capsys.readouterr().out
+    assert "joints knee, re-encoded, data" in capsys.readouterr().out
     assert run("decode", part, "--to", "csv", "-o", table) == 0
     assert run("replace", whole, "--in-place", "--joint", "knee", "--values", table) == 2
     line = ("replace", whole, "--in-place", "--joint", "knee", "--values", table, "--recode")
     capsys.readouterr()
     assert run(*line) == 0
     shown = capsys.readouterr().out
-    assert "knee of one, coded anew:" in shown and ", others by " in shown
+    assert "knee of one, re-encoded:" in shown and ", others " in shown

@@ -19,11 +19,11 @@ import mcz
 from mcz import Channel, Joint, MczError, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.model import extras
 from mcz.show.pictures import canvases, tracks
-from mcz.show.pictures.bodies import MIDDLE, body_of, fitted
+from mcz.show.pictures.bodies import MIDDLE, body_of, remove_false_bones
 from mcz.show.pictures.cameras import VIEWS, Viewport
 from mcz.show.pictures.canvases import THEMES, rgb
 from mcz.show.pictures.capsules import Shapes, capsules
-from mcz.show.pictures.rendering import drawn_frames
+from mcz.show.pictures.rendering import film_frames
 from mcz.show.pictures.stages import stage_of
 from tests.commands import run
 from tests.motions import motions, smooth
@@ -144,7 +144,7 @@ def test_bones_of_a_skeleton(walk: Motion) -> None:
     )
     body = body_of(skeleton)
     assert len(body.bones) == 6
-    shown = fitted(body, body.places(np.zeros((3, 3))))
+    shown = remove_false_bones(body, body.places(np.zeros((3, 3))))
     assert len(shown.bones) == 4
     assert 0 not in shown.shown
     assert [body.sides[node] == MIDDLE for node in range(5)] == [True, True, False, False, True]
@@ -154,7 +154,7 @@ def test_bones_of_a_skeleton(walk: Motion) -> None:
 def test_frames_of_a_film_are_those_of_their_time(
     first: int, count: int, speed: float, fps: float
 ) -> None:
-    found = drawn_frames(first, first + count, Fraction(120), Fraction(fps), speed)
+    found = film_frames(first, first + count, Fraction(120), Fraction(fps), speed)
     times = first + np.arange(len(found)) / fps * speed * 120
     assert np.abs(found - times).max() <= 0.5 + 1e-6
     assert found[0] == first
@@ -328,7 +328,7 @@ def test_what_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         with pytest.raises(OptionError, match=rf"mcz\[{extra}\]"):
             mcz.render(smooth(8), tmp_path / name)
     with pytest.raises(OptionError, match=r"av \(PyAV\).*mcz\[render\]"):
-        canvases.library("av")
+        canvases.import_library("av")
 
 
 def test_capsules_hold_their_circles() -> None:

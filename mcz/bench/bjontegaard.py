@@ -16,10 +16,10 @@ Curve = Iterable[tuple[float, float]]  # (size in bytes, quality in dB)
 FEWEST = 4  # points of a curve
 
 
-def front(curve: Curve) -> tuple[Values, Values]:
+def pareto_front(curve: Curve) -> tuple[Values, Values]:
     """Sizes and qualities of the points that no smaller point matches, both ascending.
 
-    >>> front([(20, 3.0), (10, 2.0), (30, 2.5)])
+    >>> pareto_front([(20, 3.0), (10, 2.0), (30, 2.5)])
     (array([10., 20.]), array([2., 3.]))
     """
     kept: list[tuple[float, float]] = []
@@ -31,14 +31,14 @@ def front(curve: Curve) -> tuple[Values, Values]:
 
 def bd_rate(reference: Curve, other: Curve) -> float | None:
     """Percent of bytes that ``other`` needs more at equal quality; None without a common range."""
-    a, b = front(reference), front(other)
+    a, b = pareto_front(reference), pareto_front(other)
     mean = _mean_difference((a[1], np.log10(a[0])), (b[1], np.log10(b[0])))
     return None if mean is None else float((10.0**mean - 1) * 100)
 
 
 def bd_sqnr(reference: Curve, other: Curve) -> float | None:
     """Gain of ``other`` in dB at equal size; None if the ranges do not overlap."""
-    a, b = front(reference), front(other)
+    a, b = pareto_front(reference), pareto_front(other)
     return _mean_difference((np.log10(a[0]), a[1]), (np.log10(b[0]), b[1]))
 
 

@@ -152,5 +152,5 @@ def cases_by_names(cases: Sequence[Case]) -> dict[str, Case]:
     return cases_by_name
 
 
-def why(error: MczError) -> str:
+def reason_of_failure(error: MczError) -> str:
     return " ".join(str(error).split())

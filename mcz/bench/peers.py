@@ -38,14 +38,14 @@ MODULES = {"zstd": "zstandard", "brotli": "brotli", "pcodec": "pcodec", "blosc2"
 }
 
 
-def installed() -> tuple[str, ...]:
+def installed_peers() -> tuple[str, ...]:
     """The peers that can run here."""
     return ("gzip", "xz", *(name for name, module in MODULES.items() if find_spec(module)))
 
 
-def missing() -> list[str]:
+def missing_peers() -> list[str]:
     """The peers that cannot run, by the name of the missing package."""
-    return [module for name, module in MODULES.items() if name not in installed()]
+    return [module for name, module in MODULES.items() if name not in installed_peers()]
 
 
 def measure(loaded: Loaded) -> list[Record]:
@@ -57,7 +57,7 @@ def measure(loaded: Loaded) -> list[Record]:
     matrix = np.ascontiguousarray(np.nan_to_num(values), np.float32)
     source = Source(loaded.data, values, matrix, motion.signals[0].to_ordinals()[0])
     records = [_measured(loaded, peer) for peer in _peers(source)]
-    if "zfp" in installed():
+    if "zfp" in installed_peers():
         records += _bounded(loaded, matrix)
     return records
 
@@ -105,7 +105,7 @@ class Peer:
 
 
 def _peers(source: Source) -> Iterator[Peer]:
-    have = installed()
+    have = installed_peers()
     general: dict[str, tuple[Pack, Pack]] = {
         "gzip -9": (lambda data: gzip.compress(data, 9, mtime=0), gzip.decompress),
         "xz -9e": (partial(lzma.compress, preset=9 | lzma.PRESET_EXTREME), lzma.decompress),

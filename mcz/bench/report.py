@@ -253,7 +253,7 @@ def bench(
     """Measure the clips of ``paths``; raises OptionError for an unknown codec or no clip at all."""
     variants = variants_of(codecs)
     cases = cases_by_names(find_cases(paths, unit))
-    asked = peers.installed() if with_peers else ()
+    asked = peers.installed_peers() if with_peers else ()
     clips = sweep.measure_all(runner, cases, variants, speeds=speeds, peers=asked)
     outcome = Outcome(clips, figures=[partial(draw, clips)])
     for clip in clips:
@@ -261,6 +261,6 @@ def bench(
         outcome.notes.extend(
             f"{clip.name}, {curve.label}: {curve.error}" for curve in clip.curves if curve.error
         )
-    if with_peers and peers.missing():
-        outcome.notes.append(f"peers that are not installed: {', '.join(peers.missing())}")
+    if with_peers and peers.missing_peers():
+        outcome.notes.append(f"peers that are not installed: {', '.join(peers.missing_peers())}")
     return outcome

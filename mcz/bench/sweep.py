@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.bench.bjontegaard import bd_rate, bd_sqnr, front
+from mcz.bench.bjontegaard import bd_rate, bd_sqnr, pareto_front
 from mcz.bench.cases import Case, Variant, load
 from mcz.bench.ladder import N_POINTS
 from mcz.bench.measure import Record
@@ -215,7 +215,7 @@ def at_error(curve: Curve, key: str, figure: float) -> float | None:
 
 
 def at_size(curve: Curve, key: str, size: float) -> float | None:
-    """The figure ``key`` at so many bytes, likewise."""
+    """The figure ``key`` at a size in bytes, likewise."""
     sizes, errors = _front(curve, key)
     if len(sizes) < 2 or not sizes[0] <= size <= sizes[-1]:
         return None
@@ -224,7 +224,7 @@ def at_size(curve: Curve, key: str, size: float) -> float | None:
 
 def _front(curve: Curve, key: str) -> tuple[Any, Any]:
     """Sizes ascending and errors descending of the points that no smaller point matches."""
-    sizes, negative = front((size, -error) for size, error in curve.pairs(key))
+    sizes, negative = pareto_front((size, -error) for size, error in curve.pairs(key))
     return sizes, -negative
 
 

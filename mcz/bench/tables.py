@@ -74,8 +74,8 @@ def _row(cells: Sequence[str]) -> str:
 
 def format_cell(value: Cell, spec: str) -> str:
     """
-    >>> shown(12.345, ".1f"), shown(None, ".1f"), shown("a", ""), shown(5, ",d"), shown(0.1, ",d")
-    ('12.3', '-', 'a', '5', '0')
+    >>> format_cell(12.345, ".1f"), format_cell(None, ".1f"), format_cell(5, ",d")
+    ('12.3', '-', '5')
     """
     if value is None:
         return "-"

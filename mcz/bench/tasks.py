@@ -25,7 +25,7 @@ from typing import Any
 
 import mcz
 from mcz.bench import ladder, measure, peers
-from mcz.bench.cases import Case, Variant, load, why
+from mcz.bench.cases import Case, Variant, load, reason_of_failure
 from mcz.codecs import codec_by_name
 from mcz.errors import MczError, SkeletonWarning
 
@@ -94,7 +94,7 @@ def perform(task: Task, kind: Kind) -> Any:
             warnings.simplefilter("ignore", SkeletonWarning)
             return kind.work(task)
     except MczError as error:
-        return {"error": why(error)}
+        return {"error": reason_of_failure(error)}
 
 
 def key_of(task: Task) -> str:

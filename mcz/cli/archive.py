@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mcz.cli.archive_summary import print_file_results
-from mcz.cli.common import Exit, Failure, about, existing
+from mcz.cli.common import Exit, Failure, errors_about, require_file
 from mcz.cli.hints import add_salvage_hint
 from mcz.cli.options import (
     check_force_rate,
@@ -32,7 +32,7 @@ from mcz.cli.options import (
     unit_option,
     where_option,
 )
-from mcz.cli.outputs import TARGETS, file_in
+from mcz.cli.outputs import TARGETS, resolve_output
 from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
@@ -83,10 +83,10 @@ def pack_command(
     if "://" not in folder:
         if Path(folder).is_file():
             raise Failure(f"is a file: mcz encode {shlex.quote(folder)}", Exit.USAGE, path=folder)
-        target = file_in(target, str(Path(folder).resolve()) + ".mcz")
+        target = resolve_output(target, str(Path(folder).resolve()) + ".mcz")
     if mtimes:
         options["mtimes"] = True
-    with about(folder), Progress() as progress:
+    with errors_about(folder), Progress() as progress:
         report = _packing(scheduler)(
             folder,
             target,
@@ -177,13 +177,13 @@ def append_command(
 
     for path in (*sources, target):
         if path == target or not Path(path).is_dir():
-            existing(path)
+            require_file(path)
     check_force_rate(options)
     if salvage and force:
         raise Failure("--salvage keeps what --force drops; choose one", Exit.USAGE)
     if "-" in sources:
         raise Failure("append reads files, not standard input", Exit.USAGE)
-    with about(target), Progress() as progress:
+    with errors_about(target), Progress() as progress:
         report = mcz.append(
             sources,
             target,
@@ -243,8 +243,8 @@ def unpack_command(
     """
     import mcz
 
-    existing(file)
-    with about(file), add_salvage_hint(file, {"salvage": salvage}), Progress() as progress:
+    require_file(file)
+    with errors_about(file), add_salvage_hint(file, {"salvage": salvage}), Progress() as progress:
         report = mcz.unpack(
             file,
             folder,
@@ -300,8 +300,8 @@ def export_command(
     """
     import mcz
 
-    existing(file)
-    with about(file), Progress() as progress:
+    require_file(file)
+    with errors_about(file), Progress() as progress:
         report = mcz.export(
             file,
             folder,

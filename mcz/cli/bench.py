@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, echo, existing, print_json, say, table
+from mcz.cli.common import Exit, Failure, echo, errors_about, print_json, require_file, say, table
 from mcz.cli.hints import in_options
 from mcz.cli.options import json_option, unit_option
 from mcz.cli.terminal import Progress
@@ -77,10 +77,10 @@ def bench_command(
         raise Failure(f"the papers' tables are in the source tree: {PAPERS} {paper}", Exit.USAGE)
     for path in clips:
         if not Path(path).is_dir():
-            existing(path)
+            require_file(path)
     with TemporaryDirectory() as folder, Progress() as progress, ExitStack() as stack:
         clips = clips or (_sample(folder),)
-        stack.enter_context(about(clips[0]))
+        stack.enter_context(errors_about(clips[0]))
         runner = Runner(jobs or os.cpu_count() or 1, Cache(default_folder() if cache else None))
         runner.progress = progress
         outcome = bench(

@@ -159,15 +159,15 @@ def _export(clip: Clip, target: str, part: ClipSelection, options: DecodeOptions
 
 def _signals_left_out(clip: Clip, options: DecodeOptions) -> tuple[str, ...]:
     """The signals that a table does not have, and --signal would write."""
-    from mcz.exchange.conversion.losses import of_recording, of_text
+    from mcz.exchange.conversion.losses import recording_facts, text_column_note
 
     if options.signal is not None or options.joints is not None:
         return ()
     others = [signal.name for signal in clip.signals[1:]]
     signals = [f"left out: signal {', '.join(others)} (--signal)"] if others else []
     events = " (--signal events)" if clip.recording is not None and clip.recording.events else ""
-    recording = (f"{text}{events}" for text in of_recording(clip.recording))
-    return (*signals, *of_text(clip.metadata), *recording)
+    recording = (f"{text}{events}" for text in recording_facts(clip.recording))
+    return (*signals, *text_column_note(clip.metadata), *recording)
 
 
 def _stem(clip: Clip | Motion) -> str:

@@ -11,12 +11,12 @@ import click
 
 from mcz.cli.common import (
     Exit,
-    about,
     check_new,
     echo,
-    existing,
+    errors_about,
     plural,
     print_json,
+    require_file,
     table,
     write_output,
 )
@@ -177,8 +177,8 @@ def train_command(
     refuse_inputs(output, clips)
     check_new(output, force)
     for path in clips:
-        existing(path)
-    with about(clips[0]), Progress() as progress:
+        require_file(path)
+    with errors_about(clips[0]), Progress() as progress:
         trained = train(_motions(clips, unit, progress), Recipe(**options), progress)
     write_output(output, trained.data, force)
     document = {"output": str(output), **trained.document()}
@@ -195,7 +195,7 @@ def _motions(paths: tuple[str, ...], unit: str | None, progress: Progress) -> It
 
     for number, path in enumerate(paths):
         progress(number, len(paths), f"reading {path}")
-        with about(path):
+        with errors_about(path):
             motion = mcz.read(path, unit=unit)
         yield replace(motion, name=path)  # errors name the file
 

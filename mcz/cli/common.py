@@ -102,7 +102,7 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
     _prepare_streams()
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        with _ended_by_signals(), _warnings_said():
+        with _exit_on_sigterm(), _print_warnings():
             result = command.main(
                 given, prog_name=prog, standalone_mode=False, help_option_names=["-h", "--help"]
             )
@@ -133,7 +133,7 @@ OURS = SkeletonWarning, ContactWarning
 
 
 @contextmanager
-def _warnings_said() -> Iterator[None]:
+def _print_warnings() -> Iterator[None]:
     """Print warnings of the library to standard error, each once."""
     with warnings.catch_warnings():
         for category in OURS:
@@ -205,7 +205,7 @@ class _Terminated(BaseException):
 
 
 @contextmanager
-def _ended_by_signals() -> Iterator[None]:
+def _exit_on_sigterm() -> Iterator[None]:
     """Raise an exception in the block on SIGTERM, so that it cleans up as on Ctrl-C."""
 
     def end(number: int, frame: object) -> None:
@@ -251,7 +251,7 @@ def code_of(error: Exception) -> Exit:
 
 
 @contextmanager
-def about(path: str) -> Iterator[None]:
+def errors_about(path: str) -> Iterator[None]:
     """Add ``path`` to errors raised in the block that name no file yet."""
     try:
         yield
@@ -268,7 +268,7 @@ def about(path: str) -> Iterator[None]:
         raise Failure(OUT_OF_MEMORY, path=path, kind="MemoryError") from error
 
 
-def existing(path: str, of_folders: str = "") -> None:
+def require_file(path: str, of_folders: str = "") -> None:
     """Raise Failure unless a local ``path`` is a file; ``of_folders``: the command takes
     folders.
     """
@@ -281,7 +281,7 @@ def existing(path: str, of_folders: str = "") -> None:
 def bytes_or_path(path: str) -> str | bytes:
     """``path``, which must exist; for ``-`` the bytes of standard input."""
     if path != "-":
-        existing(path)
+        require_file(path)
         return path
     if sys.stdin is None:
         raise Failure("standard input is closed")
@@ -292,7 +292,7 @@ def bytes_or_path(path: str) -> str | bytes:
 
 
 @contextmanager
-def opened(path: str, **options: Any) -> Iterator[File]:
+def open_input(path: str, **options: Any) -> Iterator[File]:
     """The MCZ file at ``path``, or on standard input for ``-``; errors name it.
 
     ``options`` are those of ``mcz.open``.
@@ -300,20 +300,20 @@ def opened(path: str, **options: Any) -> Iterator[File]:
     import mcz
 
     target = bytes_or_path(path)
-    with about(path), add_salvage_hint(target, options), mcz.open(target, **options) as file:
+    with errors_about(path), add_salvage_hint(target, options), mcz.open(target, **options) as file:
         if file.grows:
             say(f"{path}: another process is appending to it; this is what it held before")
         yield file
 
 
-def damage_of(path: str, damage: Sequence[str]) -> Exit:
+def report_damage(path: str, damage: Sequence[str]) -> Exit:
     """Print faults found by salvage; return the exit code."""
     for line in damage:
         say(f"{path}: salvage: {line}")
     return Exit.SALVAGED if damage else Exit.FINE
 
 
-def exists(path: Path) -> Failure:
+def exists_error(path: Path) -> Failure:
     """The error about an existing file that ``--force`` would replace."""
     return Failure("already exists", Exit.USAGE, path=path, kind="ExistsError", hint=Hint.FORCE)
 
@@ -321,14 +321,14 @@ def exists(path: Path) -> Failure:
 def check_new(path: Path, force: bool) -> None:
     """Raise Failure for an existing file before work on it begins."""
     if os.path.lexists(path) and not force:
-        raise exists(path)
+        raise exists_error(path)
 
 
 def write_output(path: Path, data: bytes, force: bool) -> None:
     """Write ``data`` under its name in one step, never over an existing file without ``force``."""
     from mcz.files.writing.atomic import replacing
 
-    with about(str(path)), replacing(path, force=force) as stream:
+    with errors_about(str(path)), replacing(path, force=force) as stream:
         stream.write(data)
 
 

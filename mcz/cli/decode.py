@@ -14,7 +14,7 @@ from mcz.cli.clip_outputs import (
     summary_facts,
     summary_lines,
 )
-from mcz.cli.common import Exit, Failure, JsonRefused, damage_of, plural, say
+from mcz.cli.common import Exit, Failure, JsonRefused, plural, report_damage, say
 from mcz.cli.decode_options import (
     SOURCE_GIVEN,
     DecodeOptions,
@@ -44,11 +44,11 @@ from mcz.cli.outputs import (
     TARGETS,
     Output,
     check_count,
-    check_kept,
-    deliver,
+    check_suffix,
     suffix_of,
     target_of,
     target_of_clip,
+    write_outputs,
 )
 from mcz.files.reading.fidelity import RESTORED
 from mcz.model.types import JsonObject, Settings
@@ -194,14 +194,14 @@ def decode(
                 text = "it has no clips, so --to, --frames and --post-filter do not apply"
                 raise Failure(text, Exit.USAGE, path=file)
             outputs = [_output_without_clips(opened, names)]
-            check_kept(output, outputs[0].name, is_skeleton=outputs[0].kind == "skeleton")
+            check_suffix(output, outputs[0].name, is_skeleton=outputs[0].kind == "skeleton")
         facts: JsonObject = {"damage": opened.damage, "unverified_segments": opened.unverified}
-    deliver(inputs, output, outputs, force, as_json, facts | summary_facts(summaries))
+    write_outputs(inputs, output, outputs, force, as_json, facts | summary_facts(summaries))
     if facts["unverified_segments"]:
         say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
     for line in summary_lines(summaries):
         say(f"{file}: {line}")
-    return damage_of(file, facts["damage"])
+    return report_damage(file, facts["damage"])
 
 
 def _select_clips(

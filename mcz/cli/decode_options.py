@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
-from mcz.cli.common import Exit, Failure, about, existing, opened, say
+from mcz.cli.common import Exit, Failure, errors_about, open_input, require_file, say
 from mcz.cli.hints import in_options
 from mcz.cli.outputs import CONVERSIONS, SCENES
 from mcz.model.types import Params
@@ -133,14 +133,14 @@ class Input:
         """The open .mcz, of a source file one in memory; and the files that were read for it."""
         if not self.is_source:
             options = {"salvage": self.salvage, "unverified": self.unverified, "verify": True}
-            with opened(self.file, max_decoded=self.max_decoded, **options) as file:  # CEND-06
+            with open_input(self.file, max_decoded=self.max_decoded, **options) as file:  # CEND-06
                 yield file, (self.file,)
             return
         import mcz
 
-        existing(self.file)
+        require_file(self.file)
         coded = io.BytesIO()
-        with about(self.file):
+        with errors_about(self.file):
             written = mcz.encode(self.file, coded, profile="large", **self.facts)
             for note in written.notes:
                 say(f"{self.file}: {in_options(note)}")

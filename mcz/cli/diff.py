@@ -15,12 +15,12 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
-    about,
     echo,
-    existing,
-    opened,
+    errors_about,
+    open_input,
     plural,
     print_json,
+    require_file,
     table,
 )
 from mcz.cli.figures import figure_lines
@@ -123,7 +123,7 @@ def diff_command(
         only: dict[str, list[str]] = {}
         pairs: Sequence[str | None] = names or (None,)
         if _has_several(left, right) and not names:
-            pairs = _common(left, right, left.clips)
+            pairs = _common_clips(left, right, left.clips)
             only["only_in_a"] = sorted(set(left.clips) - set(right.clips))
             only["only_in_b"] = sorted(set(right.clips) - set(left.clips))
         documents = [_compare(left, right, name, options) for name in pairs]
@@ -172,9 +172,9 @@ class _Side:
         self.path, self._options = path, options
         self.file: File | None = None
         if path == "-" or is_mcz(path):
-            self.file = stack.enter_context(opened(path, max_decoded=max_decoded))
+            self.file = stack.enter_context(open_input(path, max_decoded=max_decoded))
         else:
-            existing(path)
+            require_file(path)
 
     @property
     def clips(self) -> list[str]:
@@ -187,7 +187,7 @@ class _Side:
         from mcz.files.reading.source_files import SourceOptions
 
         options, ratios = self._options, None
-        with about(self.path):
+        with errors_about(self.path):
             if self.file is None:
                 motion = mcz.read(
                     self.path, skeleton=options.skeleton, arrays=options.arrays, model=options.model
@@ -227,11 +227,11 @@ def _filter_names(left: _Side, right: _Side, names: tuple[str, ...], where: str)
         return tuple(name for name in names if side.file[name] in clips)
     names = tuple(clip.name for clip in clips)
     if left.file is not None and right.file is not None:
-        return _common(left, right, names) if _has_several(left, right) else ()
+        return _common_clips(left, right, names) if _has_several(left, right) else ()
     return names
 
 
-def _common(left: _Side, right: _Side, names: Sequence[str]) -> tuple[str, ...]:
+def _common_clips(left: _Side, right: _Side, names: Sequence[str]) -> tuple[str, ...]:
     """The ``names`` of clips that both sides have; raises Failure if there are none."""
     shared = set(left.clips) & set(right.clips)
     both = tuple(name for name in names if name in shared)
@@ -250,7 +250,7 @@ def _compare(left: _Side, right: _Side, name: str | None, options: _Options) -> 
             f"{left.path} has {one.motion.n_frames} frames, {right.path} "
             f"{other.motion.n_frames}; --frames A:B chooses what both have"
         )
-    with about(f"{left.path}, {right.path}"):
+    with errors_about(f"{left.path}, {right.path}"):
         document = diff_document(
             one.motion,
             other.motion,

@@ -14,13 +14,13 @@ from mcz.cli.common import (
     Exit,
     Failure,
     JsonRefused,
-    about,
     binary_output,
     echo,
-    existing,
-    opened,
+    errors_about,
+    open_input,
     plural,
     print_json,
+    require_file,
     say,
 )
 from mcz.cli.figures import error_summary
@@ -35,7 +35,7 @@ from mcz.cli.options import (
     skeleton_option,
     threads_option,
 )
-from mcz.cli.outputs import file_in
+from mcz.cli.outputs import resolve_output
 from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def encode_command(
         return _encode_piped(output, skeleton, force, as_json, format_name, **options)
     if format_name is not None:
         raise Failure("--format is for standard input; SRC has a suffix", Exit.USAGE)
-    existing(source, f": mcz pack {shlex.quote(source)} OUT.mcz")
+    require_file(source, f": mcz pack {shlex.quote(source)} OUT.mcz")
     if source.lower().endswith(".mcz"):
         raise Failure("is an .mcz already; mcz append adds it to another", path=source)
     return _encode_file(source, output, skeleton, force, as_json, **options)
@@ -110,7 +110,7 @@ def _encode_piped(
     format_name: str | None,
     **options: Any,
 ) -> Exit:
-    from mcz.cli.standard_input import encode_lines, stored
+    from mcz.cli.standard_input import encode_lines, spool_input
     from mcz.files.live.text_writer import codes_live
     from mcz.files.writing.atomic import refuse_inputs
 
@@ -122,8 +122,8 @@ def _encode_piped(
         return Exit.FINE
     if output is None:
         raise Failure("standard input has no name; set the output with -o", Exit.USAGE)
-    output = file_in(output, "-")
-    with stored(format_name) as path:
+    output = resolve_output(output, "-")
+    with spool_input(format_name) as path:
         return _encode_file(path, output, skeleton, force, as_json, **options)
 
 
@@ -141,13 +141,13 @@ def _encode_file(
 
     if output == "-":
         refuse_inputs(sys.stdout, (source, skeleton))
-    target = file_in(output or str(Path(source).with_suffix(".mcz")), source, ".mcz")
+    target = resolve_output(output or str(Path(source).with_suffix(".mcz")), source, ".mcz")
     unread = output == "-" or _is_special(target)
     if unread and as_json:
         raise JsonRefused(f"-o {target} leaves no room for --json", Exit.USAGE)
     sink = binary_output() if output == "-" else None
     piped = io.BytesIO()
-    with about(source), Progress() as progress:
+    with errors_about(source), Progress() as progress:
         written = mcz.encode(
             source,
             piped if sink is not None else target,
@@ -180,7 +180,7 @@ def _tell(target: str, written: Written, as_json: bool) -> None:
         return
     from mcz.files.reading.report import info
 
-    with opened(target) as file:
+    with open_input(target) as file:
         print_json({"output": target, **info(file)})
 
 

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, damage_of, echo, existing, plural, print_json, say
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    echo,
+    errors_about,
+    plural,
+    print_json,
+    report_damage,
+    require_file,
+    say,
+)
 from mcz.cli.hints import add_salvage_hint
 from mcz.cli.options import (
     clips_option,
@@ -20,7 +30,7 @@ from mcz.cli.options import (
     salvage_option,
     where_option,
 )
-from mcz.cli.outputs import file_in
+from mcz.cli.outputs import resolve_output
 from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
@@ -80,9 +90,9 @@ def extract_command(
 
     if "-" in (file, output):
         raise Failure("extract reads and writes files, not standard streams", Exit.USAGE)
-    existing(file)
-    output = file_in(output, file)
-    with about(file), add_salvage_hint(file, {"salvage": salvage}), Progress() as progress:
+    require_file(file)
+    output = resolve_output(output, file)
+    with errors_about(file), add_salvage_hint(file, {"salvage": salvage}), Progress() as progress:
         extraction = mcz.extract(
             file,
             output,
@@ -104,7 +114,7 @@ def extract_command(
         echo(*_lines(output, extraction))
     for text in () if as_json else extraction.left_out:
         say(f"left out: {text}")
-    return damage_of(file, extraction.damage)
+    return report_damage(file, extraction.damage)
 
 
 def _lines(output: str, extraction: Extraction) -> Iterator[str]:
@@ -123,5 +133,5 @@ def _parts(clip: ExtractedClip) -> Iterator[str]:
     if clip.resolution:
         yield f"resolution {clip.resolution}"
     if clip.recoded:
-        yield "coded anew"
+        yield "re-encoded"
     yield f"data {clip.data_bytes:,} of {clip.data_bytes_before:,} bytes"

@@ -13,13 +13,13 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
-    about,
-    damage_of,
     echo,
-    existing,
-    opened,
+    errors_about,
+    open_input,
     plural,
     print_json,
+    report_damage,
+    require_file,
     run,
     say,
     table,
@@ -35,7 +35,7 @@ from mcz.cli.info_lines import (
     skeleton_lines,
     time_lines,
 )
-from mcz.cli.lazy import Once
+from mcz.cli.lazy import StrictCommand
 from mcz.cli.options import (
     clips_option,
     decoded_option,
@@ -46,7 +46,7 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.terminal import is_terminal
-from mcz.cli.verify import is_unsound
+from mcz.cli.verify import is_malformed
 from mcz.errors import FormatError, MczError
 from mcz.model.text_format import first_of
 from mcz.model.types import JsonObject
@@ -65,7 +65,9 @@ RATIOS = (  # of the bytes that a codec wrote, which alone restore no source
 )
 
 
-@click.command(cls=Once, short_help="Show the contents and sizes of a file.", epilog=EXIT_CODES)
+@click.command(
+    cls=StrictCommand, short_help="Show the contents and sizes of a file.", epilog=EXIT_CODES
+)
 @click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @json_option
 @click.option(
@@ -120,7 +122,7 @@ def info_command(
         raise Failure(text, Exit.USAGE)
     if check:
         return _validate(file, max_decoded, as_json)
-    with opened(file, salvage=salvage, max_decoded=max_decoded) as opened_file:
+    with open_input(file, salvage=salvage, max_decoded=max_decoded) as opened_file:
         if show_layout:
             parts = layout(opened_file)
         else:
@@ -133,7 +135,7 @@ def info_command(
         print_json(document)
     else:
         echo(*lines(file, document))
-    return damage_of(file, damage)
+    return report_damage(file, damage)
 
 
 def _add_previews(file: File, document: JsonObject, as_json: bool, preview: bool | None) -> None:
@@ -155,8 +157,8 @@ def _of_source(file: str, skeleton: str | None, as_json: bool, preview: bool) ->
     from mcz.cli.info_lines import motion_of, source_lines
     from mcz.files.reading.report import source_info
 
-    existing(file)
-    with about(file):
+    require_file(file)
+    with errors_about(file):
         document = source_info(file, skeleton)
         for clip in document["clips"] if preview else ():
             motion = mcz.read(file, skeleton=skeleton)
@@ -173,10 +175,10 @@ def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
 
     size = 0
     try:
-        with opened(file, max_decoded=max_decoded) as opened_file:
+        with open_input(file, max_decoded=max_decoded) as opened_file:
             size, problems = opened_file.size, validate(opened_file)
     except FormatError as error:
-        if not is_unsound(error):
+        if not is_malformed(error):
             raise
         text = error.describe(OPTION_HINTS, with_path=False)
         problems = [Problem(error.offset or 0, "Strict reading", text)]

@@ -33,7 +33,7 @@ def lazy_group(commands: Mapping[str, str]) -> type[click.Group]:
             self, ctx: click.Context, args: list[str]
         ) -> tuple[str | None, click.Command | None, list[str]]:
             if args and args[0] not in names and not args[0].startswith("-"):
-                ctx.fail(unknown(args[0], names))
+                ctx.fail(unknown_command_text(args[0], names))
             name, command, rest = super().resolve_command(ctx, args)
             if command is not None and not ctx.resilient_parsing:
                 refuse_repeats(command, name, rest, ctx)
@@ -58,7 +58,7 @@ OTHER_NAMES = {
 }
 
 
-def unknown(name: str, names: Sequence[str]) -> str:
+def unknown_command_text(name: str, names: Sequence[str]) -> str:
     """The message about an unknown command, with similar names."""
     from difflib import get_close_matches
 
@@ -96,7 +96,7 @@ def refuse_repeats(
                 raise click.UsageError(f"{shown} is given {count} times; give it once", context)
 
 
-class Once(click.Command):
+class StrictCommand(click.Command):
     """A command outside a group that rejects repeated options."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

@@ -12,12 +12,12 @@ import click
 from mcz.cli.common import (
     Exit,
     JsonRefused,
-    about,
-    damage_of,
     echo,
-    opened,
+    errors_about,
+    open_input,
     plural,
     print_json,
+    report_damage,
     table,
 )
 from mcz.cli.options import json_option, salvage_option, where_option
@@ -62,7 +62,7 @@ def list_command(
     if as_csv and as_json:
         raise JsonRefused("--csv or --json, not both", Exit.USAGE)
     names = None if columns is None else [name.strip() for name in columns.split(",")]
-    with opened(file, salvage=salvage) as opened_file, about(file):
+    with open_input(file, salvage=salvage) as opened_file, errors_about(file):
         clips = opened_file.chosen(where=where)
         if sort is not None:
             from mcz.files.editing.reorganize import in_order
@@ -90,7 +90,7 @@ def list_command(
         _print(rows, names or USUAL, totals)
         if whole:
             _print_others(attachments, aliases)
-    return damage_of(file, damage)
+    return report_damage(file, damage)
 
 
 def _rows(file: File, clips: Sequence[Clip], names: list[str] | None) -> list[JsonObject]:

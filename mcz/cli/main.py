@@ -12,9 +12,9 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
-    about,
     echo,
-    exists,
+    errors_about,
+    exists_error,
     print_json,
     run,
     write_output,
@@ -114,8 +114,8 @@ def sample_command(folder: Path, force: bool, as_json: bool) -> Exit:
     files = sample_files()
     existing = [folder / name for name in files if (folder / name).exists()]
     if existing and not force:
-        raise exists(existing[0])
-    with about(str(folder)):
+        raise exists_error(existing[0])
+    with errors_about(str(folder)):
         folder.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
         write_output(folder / name, data, force)

@@ -12,12 +12,12 @@ import click
 from mcz.cli.common import (
     Exit,
     Failure,
-    about,
     echo,
-    existing,
-    opened,
+    errors_about,
+    open_input,
     plural,
     print_json,
+    require_file,
     say,
     to_rate,
 )
@@ -119,7 +119,7 @@ def meta_command(
     Changes are appended, and the last value wins. Earlier values stay in the file until
     --purge rewrites the file.
     """
-    existing(file)
+    require_file(file)
     if of_file and (clips or where or table or rate):
         raise Failure("--file excludes --clip, --where, --from and --rate", Exit.USAGE)
     if set(pairs) & set(removed):
@@ -127,10 +127,10 @@ def meta_command(
     if form and (pairs or removed or table or rate or purge or of_file):
         raise Failure("--to prints a record, and changes nothing", Exit.USAGE)
     if form:
-        with opened(file) as opened_file, about(file):
+        with open_input(file) as opened_file, errors_about(file):
             return _describe(opened_file, opened_file.chosen(clips or None, where), form)
     if not (pairs or removed or table or rate or purge):
-        with opened(file) as opened_file:
+        with open_input(file) as opened_file:
             return _show(opened_file, _select_clips(opened_file, clips, where, of_file), as_json)
     rows = None
     if table is not None:
@@ -195,7 +195,7 @@ def _changes(
     """Metadata changes by clip, and the table rows that match no clip."""
     changes: dict[str, dict[str, str | None]] = {}
     unknown: list[str] = []
-    with opened(file) as opened_file, about(file):
+    with open_input(file) as opened_file, errors_about(file):
         if rows is not None:
             table_rows, unknown = rows(opened_file)
             clip_names = {clip.name for clip in opened_file.chosen(clips or None, where)}
@@ -223,7 +223,7 @@ def _set(
 
     outcomes = []
     clips, where, force = rated
-    with about(file), Progress() as progress:
+    with errors_about(file), Progress() as progress:
         if rate is not None:
             report = mcz.set_rate(
                 file, rate, clips or None, where=where, force=force, progress=progress

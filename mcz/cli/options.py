@@ -8,8 +8,8 @@ from functools import wraps
 
 import click
 
-from mcz.cli.common import Exit, Failure, echo, existing, to_frames, to_params, to_rate
-from mcz.cli.outputs import file_in
+from mcz.cli.common import Exit, Failure, echo, require_file, to_frames, to_params, to_rate
+from mcz.cli.outputs import resolve_output
 from mcz.model.types import Settings
 
 EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
@@ -57,8 +57,8 @@ def output_option(function: Function) -> Function:
 
     @wraps(function)
     def command(*, file: str, output: str | None, **options: object) -> object:
-        existing(file)
-        return function(file=file, output=output and file_in(output, file), **options)
+        require_file(file)
+        return function(file=file, output=output and resolve_output(output, file), **options)
 
     return click.option(
         "-o",

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from mcz.cli.common import (
     Exit,
     Failure,
-    about,
     binary_output,
     check_new,
     echo,
+    errors_about,
     print_json,
     text_output,
     write_output,
@@ -51,7 +51,7 @@ def is_folder(output: str) -> bool:
     return output[-1:] in (os.sep, os.altsep) or Path(output).is_dir()
 
 
-def file_in(output: str, source: str, suffix: str = "") -> str:
+def resolve_output(output: str, source: str, suffix: str = "") -> str:
     """``output``, or a file in it if it is a folder, with the name of ``source``.
 
     ``suffix`` replaces the suffix of ``source``. A folder with a slash at the end is created.
@@ -62,7 +62,7 @@ def file_in(output: str, source: str, suffix: str = "") -> str:
     if source == "-":
         text = f"{output} is a folder; standard input has no name, so name a file in it"
         raise Failure(text, Exit.USAGE)
-    with about(output):
+    with errors_about(output):
         Path(output).mkdir(parents=True, exist_ok=True)
     name = PurePath(source).name
     return str(Path(output, PurePath(name).with_suffix(suffix) if suffix else name))
@@ -91,7 +91,7 @@ def target_of_clip(clip: Clip, output: str | None, *, plain: bool) -> str | None
     return target
 
 
-def check_kept(output: str | None, name: str, *, is_skeleton: bool) -> None:
+def check_suffix(output: str | None, name: str, *, is_skeleton: bool) -> None:
     """Raise Failure unless an output has the suffix of the file ``name`` itself.
 
     A skeleton's file is an ASF under any name.
@@ -130,7 +130,7 @@ def check_count(output: str | None, count: int) -> None:
         raise Failure(f"-o {output} is one file, for {count} clips; name a folder", Exit.USAGE)
 
 
-def deliver(
+def write_outputs(
     given: Sequence[str],
     output: str | None,
     outputs: Sequence[Output],
@@ -159,7 +159,7 @@ def deliver(
     for path in paths:
         check_new(path, force)
     if output is not None and is_folder(output):
-        with about(output):
+        with errors_about(output):
             Path(output).mkdir(parents=True, exist_ok=True)
     rows = []
     for path, output_file in zip(paths, outputs, strict=True):

@@ -15,13 +15,13 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
-    about,
     check_new,
     echo,
-    existing,
-    opened,
+    errors_about,
+    open_input,
     plural,
     print_json,
+    require_file,
     say,
     table,
 )
@@ -38,7 +38,7 @@ from mcz.cli.options import (
     unit_option,
     up_option,
 )
-from mcz.cli.outputs import file_in
+from mcz.cli.outputs import resolve_output
 from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
@@ -86,11 +86,11 @@ def open_motion(
     from mcz.files.reading.source_files import SourceOptions
 
     if path == "-" or is_mcz(path):
-        with opened(path, max_decoded=max_decoded) as file, about(path):
+        with open_input(path, max_decoded=max_decoded) as file, errors_about(path):
             yield file.only_clip(name)
         return
-    existing(path)
-    with about(path):
+    require_file(path)
+    with errors_about(path):
         read = {name: facts.pop(name) for name in ("skeleton", "arrays", "model")}
         yield SourceOptions(**facts).completing(mcz.read(path, **read))
 
@@ -180,14 +180,14 @@ def render_command(
     if file == "-" and output is None:
         raise Failure("standard input has no name; set the output with -o", Exit.USAGE)
     suffix = ".gif" if options["sheet"] is None else ".png"
-    target = file_in(output or str(Path(file).with_suffix(suffix)), file, suffix)
+    target = resolve_output(output or str(Path(file).with_suffix(suffix)), file, suffix)
     refuse_inputs(target, (file, skeleton))
     if "://" not in target:
         check_new(Path(target), force)
     facts = {key: options[key] for key in ("rate", "up", "unit")}
     own = {key: options.pop(key) for key in ("arrays", "model")}
     input_options = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts, **own}
-    with open_motion(file, **input_options) as motion, about(file), Progress() as progress:
+    with open_motion(file, **input_options) as motion, errors_about(file), Progress() as progress:
         drawn = mcz.render(
             motion,
             target,
@@ -286,7 +286,7 @@ def plot_command(
         raise Failure("standard input has no name; set the output with -o", Exit.USAGE)
     if file == other == "-":
         raise Failure("only one of FILE and FILE2 can be standard input", Exit.USAGE)
-    target = file_in(output or str(Path(file).with_suffix(".png")), file, ".png")
+    target = resolve_output(output or str(Path(file).with_suffix(".png")), file, ".png")
     refuse_inputs(target, (file, other, skeleton))
     check_new(Path(target), force)
     facts = {key: options[key] for key in ("rate", "up", "unit")}
@@ -298,7 +298,7 @@ def plot_command(
         motion = stack.enter_context(open_motion(file, **input_options))
         if other is not None:
             options["other"] = stack.enter_context(open_motion(other, **input_options))
-        stack.enter_context(about(file))
+        stack.enter_context(errors_about(file))
         progress = stack.enter_context(Progress())
         cut = frame_bounds(frames, motion)
         plotted = mcz.plot(

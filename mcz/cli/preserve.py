@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, echo, existing, plural, print_json, say
+from mcz.cli.common import Exit, Failure, echo, errors_about, plural, print_json, require_file, say
 from mcz.cli.options import decoded_option, force_option, json_option
-from mcz.cli.outputs import file_in
+from mcz.cli.outputs import resolve_output
 from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
@@ -56,14 +56,14 @@ def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_js
     Parts appended later have their own recovery data, which may be lost with the tail; --anew makes
     one set for the whole file.
     """
-    existing(file)
+    require_file(file)
     if anew and check:
         raise Failure("--check changes nothing, --anew does; choose one", Exit.USAGE)
     if check:
         return _check_protection(file, as_json)
     import mcz
 
-    with about(file), Progress() as progress:
+    with errors_about(file), Progress() as progress:
         protections = mcz.protect(
             file,
             redundancy,
@@ -88,7 +88,7 @@ def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_js
 def _check_protection(file: str, as_json: bool) -> Exit:
     from mcz.files.editing.recovering import Recovery, check_recovery
 
-    with about(file):
+    with errors_about(file):
         recovery = check_recovery(file)
     if as_json:
         document = asdict(recovery or Recovery()) | {"protected": recovery is not None}
@@ -133,9 +133,9 @@ def repair_command(
 
     if "-" in (file, output):
         raise Failure("repair reads and writes files, not standard streams", Exit.USAGE)
-    existing(file)
-    output = file_in(output, file)
-    with about(file), Progress() as progress:
+    require_file(file)
+    output = resolve_output(output, file)
+    with errors_about(file), Progress() as progress:
         result = mcz.repair(file, output, force=force, max_decoded=max_decoded, progress=progress)
     if as_json:
         print_json({"output": output, **asdict(result)})
@@ -190,7 +190,7 @@ def bag_command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_j
     lines = [_info_line(text) for text in info]
     if len({name.lower() for name, _ in lines}) < len(lines):
         raise Failure("--info: a name is given twice", Exit.USAGE)
-    with about(folder):
+    with errors_about(folder):
         path = mcz.bag(files, folder, dict(lines), software=f"mcz {mcz.__version__}")
         check = check_bag(path)
     if check.problems:  # a disk may not keep the written bytes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from mcz.cli.archive_summary import print_clip_results
-from mcz.cli.common import Exit, Failure, about, existing
+from mcz.cli.common import Exit, Failure, errors_about, require_file
 from mcz.cli.options import force_option, json_option, output_option, where_option
 from mcz.cli.terminal import Progress
 
@@ -38,8 +38,8 @@ def delete_command(
     import mcz
 
     if not names and where is None:
-        raise Failure("name the things to delete, or use --where", Exit.USAGE)
-    with about(file), Progress() as progress:
+        raise Failure("name what to delete, or use --where", Exit.USAGE)
+    with errors_about(file), Progress() as progress:
         report = mcz.delete_clips(
             file, names, where=where, aliases=aliases, output=output, force=force, progress=progress
         )
@@ -66,7 +66,7 @@ def rename_command(
     pairs = dict(zip(names[::2], names[1::2], strict=True))
     if len(pairs) < len(names) // 2:
         raise Failure("one old name is given twice", Exit.USAGE)
-    with about(file), Progress() as progress:
+    with errors_about(file), Progress() as progress:
         report = mcz.rename_clips(file, pairs, output=output, force=force, progress=progress)
     return print_clip_results(report, output or file, as_json, listed=("renamed",))
 
@@ -98,7 +98,7 @@ def reorder_command(
 
     if not names and by is None:
         raise Failure("name the clips that come first, or use --by", Exit.USAGE)
-    with about(file), Progress() as progress:
+    with errors_about(file), Progress() as progress:
         report = mcz.reorder_clips(
             file, names, by=by, output=output, force=force, progress=progress
         )
@@ -132,8 +132,8 @@ def split_command(
     """
     import mcz
 
-    existing(file)
-    with about(file), Progress() as progress:
+    require_file(file)
+    with errors_about(file), Progress() as progress:
         report = mcz.split(file, folder, by=by, rest=rest, force=force, progress=progress)
     return print_clip_results(report, folder, as_json, listed=("written",))
 
@@ -171,8 +171,8 @@ def merge_command(
     import mcz
 
     for source in sources:
-        existing(source)
-    with about(output), Progress() as progress:
+        require_file(source)
+    with errors_about(output), Progress() as progress:
         report = mcz.merge(
             sources,
             output,

@@ -13,9 +13,19 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.cli.common import Exit, Failure, about, echo, existing, plural, print_json, printable, say
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    echo,
+    errors_about,
+    plural,
+    print_json,
+    printable,
+    require_file,
+    say,
+)
 from mcz.cli.options import copies_option, force_option, json_option
-from mcz.cli.outputs import file_in
+from mcz.cli.outputs import resolve_output
 from mcz.cli.terminal import Progress
 from mcz.model.text_format import cell_text
 
@@ -76,11 +86,11 @@ def replace_command(
         raise Failure("name OUT.mcz, or use --in-place to change IN.mcz itself", Exit.USAGE)
     if "-" in (file, output, table):
         raise Failure("replace reads and writes files, not standard streams", Exit.USAGE)
-    existing(file)
-    existing(table)
-    output = output and file_in(output, file)
+    require_file(file)
+    require_file(table)
+    output = output and resolve_output(output, file)
     shown = output or file
-    with about(file):
+    with errors_about(file):
         if output is not None and Path(output).exists() and Path(output).samefile(file):
             raise Failure("it is IN.mcz itself; --in-place changes that", Exit.USAGE, path=output)
         refuse_inputs(shown, (table,))

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from mcz.cli.common import (
     Exit,
     Failure,
-    about,
     binary_output,
     check_new,
     echo,
+    errors_about,
     literal,
     plural,
     say,
@@ -57,10 +57,10 @@ def live_input(timeout: float | None = None) -> BinaryIO:
         if timeout is not None and raw is not None:
             raise Failure("--timeout needs --connect on Windows", Exit.USAGE)
         return stream
-    return BufferedReader(Awaited(raw, timeout))
+    return BufferedReader(InputWaiter(raw, timeout))
 
 
-class Awaited(RawIOBase):
+class InputWaiter(RawIOBase):
     """Waits for bytes without reading: a read ignores an interrupt that came just before.
 
     It ends at the end of ``raw``, when the connection breaks, and after ``timeout`` seconds without
@@ -91,14 +91,14 @@ class Awaited(RawIOBase):
 
 
 @contextmanager
-def stored(format_name: str | None) -> Iterator[str]:
+def spool_input(format_name: str | None) -> Iterator[str]:
     """The path of a file with all of standard input, within the block."""
     from mcz.files.live.text_writer import suffix_of
 
     data = standard_input().read()
     if not data:
         raise Failure(f"{NAME} is empty", path="-")
-    with about(NAME):
+    with errors_about(NAME):
         suffix = suffix_of(data, format_name)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "stdin" / f"stdin{suffix}"  # alone in its folder
@@ -121,11 +121,11 @@ def encode_lines(
             raise Failure(f"--{name} has no meaning for coding frame by frame", Exit.USAGE)
     stream = live_input()
     name = format_name or ("bvh" if skeleton is None else "amc")
-    with about(NAME), live_output(target, force) as sink:
+    with errors_about(NAME), live_output(target, force) as sink:
         encoding = encoding_options(options.pop("codec"), None, options.pop("params"))
         facts = SourceOptions(skeleton=skeleton, **options)
         live = begin_live(iter(stream.readline, b""), sink, name, facts, encoding)
-        with live.writer, aborting(live.writer):
+        with live.writer, note_abort(live.writer):
             live.push_all()
     for remark in live.remarks:
         say(f"{NAME}: {remark}")
@@ -133,7 +133,7 @@ def encode_lines(
 
 
 @contextmanager
-def aborting(writer: LiveWriter) -> Iterator[None]:
+def note_abort(writer: LiveWriter) -> Iterator[None]:
     """Add to errors that the clip is left without an end."""
     try:
         yield
@@ -179,7 +179,7 @@ def rate_warning(traffic: LiveTraffic) -> str:
 
 
 @contextmanager
-def live_output(target: str | None, force: bool) -> Iterator[BinaryIO | _Late]:
+def live_output(target: str | None, force: bool) -> Iterator[BinaryIO | _LazyFile]:
     """Open an unbuffered output, which keeps all frames written before a crash."""
     if target in (None, "-"):
         yield binary_output()
@@ -187,11 +187,11 @@ def live_output(target: str | None, force: bool) -> Iterator[BinaryIO | _Late]:
     path = Path(str(target))
     if not _is_special(path):
         check_new(path, force)
-    with _Late(path) as sink:
+    with _LazyFile(path) as sink:
         yield sink
 
 
-class _Late:
+class _LazyFile:
     """A file that is opened for its first bytes: an error before leaves an old one unchanged."""
 
     def __init__(self, path: Path) -> None:
@@ -199,7 +199,7 @@ class _Late:
         self._stack = ExitStack()
         self._stream: FileIO | None = None
 
-    def __enter__(self) -> _Late:
+    def __enter__(self) -> _LazyFile:
         return self
 
     def __exit__(self, *_: object) -> None:

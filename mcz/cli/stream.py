@@ -18,11 +18,11 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
-    about,
     binary_output,
-    existing,
+    errors_about,
     plural,
     printable,
+    require_file,
     say,
     text_output,
 )
@@ -41,9 +41,9 @@ from mcz.cli.standard_input import (
     NUMBER,
     STATE,
     Rows,
-    aborting,
     live_input,
     live_output,
+    note_abort,
     rate_warning,
     report_live,
     skeleton_in,
@@ -52,7 +52,7 @@ from mcz.errors import TruncatedError
 from mcz.model.text_format import spreadsheet_cell
 
 if TYPE_CHECKING:
-    from mcz.cli.tcp import Heart
+    from mcz.cli.tcp import Heartbeat
     from mcz.files.live.clip_state import LiveClip, LiveFrame, Lost
     from mcz.files.live.generators import LiveReader
     from mcz.files.live.writer import LiveWriter
@@ -153,7 +153,8 @@ def stream_encode_command(
     A bad or truncated row aborts the stream: all earlier frames are sent, but not the end. Finally
     standard error reports the size of the stream, including framing.
     """
-    from mcz.cli.tcp import Heart, listening
+    from mcz.cli import tcp
+    from mcz.cli.tcp import Heartbeat
     from mcz.files.writing.atomic import refuse_inputs
 
     if listen is not None and output is not None:
@@ -161,24 +162,24 @@ def stream_encode_command(
     if clients and listen is None:
         raise Failure("--clients needs --listen", Exit.USAGE)
     if skeleton is not None:
-        existing(skeleton)
+        require_file(skeleton)
     if listen is None:
         refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
-    with about(NAME):
+    with errors_about(NAME):
         if listen is not None:
             beat = HEARTBEAT if heartbeat is None else heartbeat
-            with listening(listen, token) as listener:
+            with tcp.listen(listen, token) as listener:
                 source = _Source(skeleton, binary)
                 writer = _writer(listener, source, **options)
                 listener.entry = lambda: writer.entry
-                with Heart(writer, beat, listener) as heart, writer:
+                with Heartbeat(writer, beat, listener) as heart, writer:
                     listener.wait_for(clients)
                     _push_all(source.rows, writer, heart)
         else:
             with live_output(output, force) as sink:
                 source = _Source(skeleton, binary)
                 writer = _writer(sink, source, **options)
-                with Heart(writer, heartbeat or 0.0) as heart, writer:
+                with Heartbeat(writer, heartbeat or 0.0) as heart, writer:
                     _push_all(source.rows, writer, heart)
     report_live(output, writer)
     return Exit.FINE
@@ -214,9 +215,9 @@ def _writer(
     return LiveWriter(sink, skeleton, frame_rate=rate, **live)
 
 
-def _push_all(rows: Rows, writer: LiveWriter, heart: Heart) -> None:
+def _push_all(rows: Rows, writer: LiveWriter, heart: Heartbeat) -> None:
     warned = False
-    with aborting(writer):
+    with note_abort(writer):
         for row in rows:
             with heart.lock:
                 if isinstance(row, dict):
@@ -294,7 +295,7 @@ def stream_decode_command(
     where = connect or (NAME if file == "-" else file)
     if timeout is None and connect is not None:
         timeout = TIMEOUT
-    with about(where), _input_stream(file, connect, token, timeout or None) as stream:
+    with errors_about(where), _input_stream(file, connect, token, timeout or None) as stream:
         join = join or connect is not None
         reader = stream_decode(stream, lost=lost, join=join, post_filter=post_filter, rate=rate)
         try:
@@ -323,14 +324,14 @@ def _input_stream(
     file: str, connect: str | None, token: str | None, timeout: float | None
 ) -> Iterator[BinaryIO]:
     if connect is not None:
-        from mcz.cli.tcp import connected
+        from mcz.cli import tcp
 
-        with connected(connect, token, timeout) as stream:
+        with tcp.connect(connect, token, timeout) as stream:
             yield stream
     elif file == "-":
         yield live_input(timeout)
     else:
-        existing(file)
+        require_file(file)
         with builtins.open(file, "rb") as stream:
             yield stream
 

@@ -13,8 +13,8 @@ from threading import Condition, Event, Lock, Thread
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, BinaryIO
 
-from mcz.cli.common import Exit, Failure, about, say
-from mcz.cli.standard_input import Awaited
+from mcz.cli.common import Exit, Failure, errors_about, say
+from mcz.cli.standard_input import InputWaiter
 
 if TYPE_CHECKING:
     from mcz.files.live.writer import LiveWriter
@@ -43,7 +43,7 @@ def _is_name(host: str) -> bool:
 
 
 @contextmanager
-def connected(
+def connect(
     text: str, token: str | None = None, timeout: float | None = None
 ) -> Iterator[BinaryIO]:
     """Connect to ``HOST:PORT`` and yield its binary stream; ``token`` is sent first if given.
@@ -57,7 +57,7 @@ def connected(
         connection.settimeout(None)
         if token is not None:
             connection.sendall(line_of(token))
-        waiting = Awaited(raw, timeout)
+        waiting = InputWaiter(raw, timeout)
         stream = BufferedReader(waiting)
         if not stream.peek(1):
             hint = "is the --token right?" if token else "it may ask for a --token"
@@ -73,7 +73,7 @@ def line_of(token: str) -> bytes:
     return token.encode() + b"\n"
 
 
-def is_here(host: str) -> bool:
+def is_local(host: str) -> bool:
     """Return whether a listening address is reachable from this machine only."""
     from ipaddress import ip_address
 
@@ -112,10 +112,10 @@ class Listener:
     @property
     def is_open_to_others(self) -> bool:
         """Return whether other machines can reach the port."""
-        return not is_here(str(self._server.getsockname()[0]))
+        return not is_local(str(self._server.getsockname()[0]))
 
     def wait_for(self, n_clients: int) -> None:
-        """Wait for so many clients."""
+        """Wait for ``n_clients``."""
         with self._changed:
             self._changed.wait_for(lambda: len(self._clients) >= n_clients)
 
@@ -271,9 +271,9 @@ class _Client:
 
 
 @contextmanager
-def listening(where: str, token: str | None) -> Iterator[Listener]:
+def listen(where: str, token: str | None) -> Iterator[Listener]:
     """A sink that sends to clients."""
-    with about(where):
+    with errors_about(where):
         listener = Listener(where, token)
     say(f"listening on {listener.address}")
     if listener.is_open_to_others:
@@ -286,7 +286,7 @@ def listening(where: str, token: str | None) -> Iterator[Listener]:
         listener.close()
 
 
-class Heart:
+class Heartbeat:
     """Writes a heartbeat after every ``seconds`` without a frame, from a thread; 0: never.
 
     Users of the writer hold ``lock``.
@@ -300,7 +300,7 @@ class Heart:
         self._is_over = Event()
         self._thread = Thread(target=self._beat, daemon=True)
 
-    def __enter__(self) -> Heart:
+    def __enter__(self) -> Heartbeat:
         if self._seconds:
             self._thread.start()
         return self

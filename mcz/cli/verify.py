@@ -12,14 +12,14 @@ import click
 from mcz.cli.common import (
     Exit,
     Failure,
-    about,
     bytes_or_path,
     check_new,
     echo,
-    existing,
-    opened,
+    errors_about,
+    open_input,
     plural,
     print_json,
+    require_file,
     say,
     write_output,
 )
@@ -87,7 +87,7 @@ def verify_command(
     if date is not None and report is None:
         raise Failure("--date belongs to --report", Exit.USAGE)
     if source is not None:
-        existing(source)
+        require_file(source)
     is_folder = Path(file).is_dir()
     if is_folder and (where is not None or source is not None):
         raise Failure("--where and --source are of one file, not of a bag", Exit.USAGE)
@@ -126,7 +126,7 @@ def _verify_bag(
 
     if not is_bag(folder):
         raise Failure("a folder and no bag: it has no bagit.txt", path=folder, kind="AccessError")
-    with about(folder), Progress() as progress:
+    with errors_about(folder), Progress() as progress:
         bag = check_bag(folder, progress)
     fine, documents, files = not bag.problems, [], []
     for name in bag.files:
@@ -170,14 +170,14 @@ def _verify_fully(
 ) -> tuple[list[JsonObject], str]:
     """The verification row of each part of the file, and a line for success."""
     try:
-        with opened(file, max_decoded=max_decoded) as opened_file, Progress() as progress:
+        with open_input(file, max_decoded=max_decoded) as opened_file, Progress() as progress:
             rows = list(_check_parts(opened_file, where, progress))
             if source is not None:
                 rows.append(_compare(opened_file, source))
             if report_file is not None:
                 report_file.take(opened_file)
     except MczError as error:
-        if not is_unsound(error):
+        if not is_malformed(error):
             raise
         if report_file is not None:
             report_file.take_bytes(file)
@@ -189,14 +189,14 @@ def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[J
     from mcz.files.reading.faults import quick_check
 
     target = bytes_or_path(file)
-    with about(file), Progress() as progress:
+    with errors_about(file), Progress() as progress:
         seen, problems = quick_check(target, lambda done, total: progress(done, total, file))
     if report_file is not None:
         try:
-            with opened(file) as opened_file:
+            with open_input(file) as opened_file:
                 report_file.take(opened_file)
         except MczError as error:
-            if not is_unsound(error):
+            if not is_malformed(error):
                 raise
             report_file.take_bytes(file)
     counts = f"{seen.n_chunks:,} chunks"
@@ -208,7 +208,7 @@ def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[J
     return rows, f"checksums right, {counts}; values and sources were not checked"
 
 
-def is_unsound(error: MczError) -> bool:
+def is_malformed(error: MczError) -> bool:
     """Return whether the error means a malformed file, not an unsupported one."""
     return isinstance(error, FormatError) and not isinstance(error, UnsupportedError | LimitError)
 
@@ -238,7 +238,7 @@ def _counts(rows: list[JsonObject]) -> Iterator[str]:
 def _compare(file: File, source: str) -> JsonObject:
     """Compare SRC with the restored file of its name, or with the only clip."""
     restore = _find_restore(file, source)
-    with about(source):
+    with errors_about(source):
         expected = Path(source).read_bytes()
         restored = restore()
     if restored == expected:
@@ -281,7 +281,7 @@ class VerifyReport:
         self.path, self.force = Path(path), force
         if self.path.suffix.lower() not in SUFFIXES:
             raise Failure("a report is a .txt or a .json", Exit.USAGE, path=path)
-        with about(path):
+        with errors_about(path):
             refuse_inputs(path, inputs)
         check_new(self.path, force)
         self.date = _current_time() if date is None else None if date == NONE else date
@@ -298,7 +298,7 @@ class VerifyReport:
         from mcz.cli.verification_report import bytes_facts
         from mcz.files.reading.file import open_bytes
 
-        with about(file):
+        with errors_about(file):
             source = open_bytes(bytes_or_path(file))
             try:
                 self._facts = bytes_facts(source)

@@ -17,9 +17,9 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
-    about,
     check_new,
     echo,
+    errors_about,
     plural,
     print_json,
     say,
@@ -43,7 +43,7 @@ from mcz.cli.options import (
     up_option,
     where_option,
 )
-from mcz.cli.outputs import file_in
+from mcz.cli.outputs import resolve_output
 from mcz.cli.terminal import say_json
 from mcz.model.extras import import_extra
 from mcz.model.types import JsonObject, Settings
@@ -134,7 +134,7 @@ def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **op
     time series.
     """
     if output is not None:
-        output = file_in(output, files[0], ".rrd" if options["rerun"] else ".html")
+        output = resolve_output(output, files[0], ".rrd" if options["rerun"] else ".html")
     in_rerun = is_rerun(options.pop("rerun"), output)
     _check_use(output, options, in_rerun)
     from mcz.show.viewing.file_registry import FileRegistry, add_path
@@ -149,7 +149,7 @@ def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **op
     registry = FileRegistry(facts, told, salvage=options["salvage"], hints=OPTION_HINTS)
     try:
         for path in files:
-            with about(path):
+            with errors_about(path):
                 add_path(registry, path)
         if in_rerun:
             return show_in_rerun(registry, output, as_json, options)
@@ -194,9 +194,7 @@ def _serve(
         else:
             echo(server.url)
         if not no_browser and not show(server.url):
-            registry.report(
-                "there is no browser to open; the address above is for one on this machine"
-            )
+            registry.report("no browser found; open the address above on this machine")
         try:
             server.site.visitors.wait(for_ever=keep)
         except KeyboardInterrupt:
@@ -213,7 +211,7 @@ def _write_page(registry: FileRegistry, output: str, as_json: bool, options: Set
     force, most = options.pop("force"), options.pop("most") or MOST_BYTES
     if "://" not in output:
         check_new(Path(output), force)
-    with about(output):
+    with errors_about(output):
         written = write_page(
             page(registry.report), registry, output, PageOptions(**options), most=most, force=force
         )
@@ -282,8 +280,7 @@ def _recording() -> Any:
 def _check_screen() -> None:
     if sys.platform.startswith("linux") and not any(map(os.environ.get, SCREENS)):
         raise Failure(
-            f"there is no screen for the viewer of rerun; -o OUT{RERUN_SUFFIX} writes a file for "
-            "one elsewhere"
+            f"the rerun viewer needs a screen; -o OUT{RERUN_SUFFIX} writes a file for one elsewhere"
         )
 
 
@@ -296,7 +293,7 @@ def _write_rerun(
     check_new(Path(output), options["force"])
     inputs = [file.source for _, file in registry.initial_files()]
     with (
-        about(output),
+        errors_about(output),
         tempfile.TemporaryDirectory() as folder,
         replacing(output, force=options["force"], inputs=inputs) as stream,
     ):
@@ -348,7 +345,7 @@ def _clips(registry: FileRegistry, options: Settings) -> Iterator[tuple[str, Cli
 
     for _, given in registry.initial_files():
         with (
-            about(given.source),
+            errors_about(given.source),
             open(
                 given.target(), salvage=options["salvage"], max_decoded=options["max_decoded"]
             ) as file,

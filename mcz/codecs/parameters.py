@@ -81,13 +81,13 @@ TARGETS = (
     Parameter(
         "target_bytes",
         None,
-        "at most so many bytes of payload, overhead and models",
+        "greatest size in bytes: payload, overhead and models",
         integer("target_bytes", 1, 2**53 - 1),
     ),
     Parameter(
         "kbps",
         None,
-        "at most so many kilobits of payload a second, framing not counted",
+        "greatest rate in kilobits of payload a second, framing not counted",
         number("kbps", 1e-9, 1e9),
     ),
     Parameter(

@@ -322,7 +322,7 @@ STEP = Parameter(
 THRESHOLD_PARAMETER = Parameter(
     "threshold",
     None,
-    f"coefficients below so many steps become 0; default {THRESHOLD}",
+    f"threshold in steps, below which coefficients become 0; default {THRESHOLD}",
     number("threshold", 0.5, 2.0**20),
 )
 BASIS = Parameter(

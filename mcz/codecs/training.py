@@ -157,7 +157,7 @@ def with_headings(training: TrainingSet, n_turns: int) -> TrainingSet:
 
 
 def frames_of(training: TrainingSet, every: int = 1) -> Floats:
-    """All frames of the clips, or every so many of each, (N, J, 3)."""
+    """All frames of the clips, or every n-th of each, (N, J, 3)."""
     if every < 1:
         raise OptionError(f"every is {every}; it must be at least 1")
     return np.concatenate([clip[::every] for clip in training.clips])
@@ -194,7 +194,7 @@ class Recipe:
 
     ``kind``, one of ``KINDS``, is the data to make sparse: "frames" themselves, "steps" from one to
     a later one, DCT coefficients of "windows". ``mirror`` and ``headings`` add mirrored and turned
-    copies of the clips; ``every`` uses only every so many frames, or steps.
+    copies of the clips; ``every`` uses only every n-th frame, or step.
 
     Why steps? A codec codes changes: differences of frames, or windows of which all but one
     coefficient in time are of movement. Bases learned from steps take fewer bits there at equal

@@ -143,7 +143,7 @@ def _columns(motion: Motion) -> list[_Column]:
 def _columns_of(
     point: str, joint: Joint, length: str, angle: str
 ) -> Iterable[tuple[str, str, str, str, str]]:
-    """The columns of a joint; plain scalars are no points."""
+    """The columns of a joint; plain scalars are not points."""
     for channel in joint.channels:
         label, unit = _word(channel.label), _word(channel.unit) or NOT_APPLICABLE
         name = point if len(joint.channels) == 1 else f"{point}_{label}"

@@ -114,7 +114,7 @@ def load_unit(folder: Path, name: str) -> tuple[ModuleType | None, str]:
         return None, f"{path.name} cannot be loaded: {error}"
     changed = changed_source(module.SOURCES)
     if changed:
-        return None, f"mcz/{changed} is newer than its compiled form; build it anew"
+        return None, f"mcz/{changed} is newer than its compiled form; build the kernels again"
     return module, ""
 
 

@@ -27,10 +27,10 @@ def rotation_columns(channels: Sequence[Channel]) -> Ints:
     return np.flatnonzero(kinds).astype(np.int64)
 
 
-def turns(steps: Floats, full: float) -> Floats:
+def whole_turns(steps: Floats, full: float) -> Floats:
     """Whole turns in each step from row to row; exactly half a turn, either way, counts as none.
 
-    >>> turns(np.array([180.0, 180.5, -180.0, -540.5]), 360.0)
+    >>> whole_turns(np.array([180.0, 180.5, -180.0, -540.5]), 360.0)
     array([ 0.,  1., -0., -2.])
     """
     ratio = steps / full
@@ -80,7 +80,9 @@ class Unwrapper:
             self._last, self._begun = block[-1].copy(), np.ones_like(self._begun)
         else:
             steps = self._valid_steps(block, part)
-        counted = np.cumsum(np.concatenate([self._turns[None], turns(steps, self._full)]), axis=0)
+        counted = np.cumsum(
+            np.concatenate([self._turns[None], whole_turns(steps, self._full)]), axis=0
+        )
         self._turns = counted[-1].copy()
         out[:, self._columns] = np.where(part, block - self._full * counted[1:], block)
         return out
@@ -116,7 +118,7 @@ def without_turns(
     columns = rotation_columns(skeleton.channels if channels is None else channels)
     if full is not None and len(columns):
         block = out[:, columns]
-        counted = turns(np.where(np.abs(block) < BEYOND, block, 0.0), full)
+        counted = whole_turns(np.where(np.abs(block) < BEYOND, block, 0.0), full)
         out[:, columns] = block - full * counted
     return out
 

@@ -20,7 +20,7 @@ SHELL_CM = 3.0  # from a joint's origin to a point of its shell, the default
 class Places(NamedTuple):
     """Positions over time, each float64 (n_frames, n, 3) in length units.
 
-    ``points`` as of ``positions``, ``markers`` as of ``virtual_markers_of``, ``shell`` as of
+    ``points`` as in ``positions``, ``markers`` as in ``virtual_markers_of``, ``shell`` as of
     ``shell_points_of``; empty (n = 0) if not requested.
     """
 

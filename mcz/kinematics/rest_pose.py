@@ -71,7 +71,7 @@ def note_on_height(height: float, unit_cm: float) -> str:
     """The same for a height in length units.
 
     >>> note_on_height(27.5, 2.54)
-    "height 27.5 units = 69.9 cm, which is no person's; is 1 unit = 2.54 cm right?"
+    "height 27.5 units = 69.9 cm, which is not human; is 1 unit = 2.54 cm right?"
     >>> note_on_height(27.5, 5.6444)
     ''
     """
@@ -80,6 +80,6 @@ def note_on_height(height: float, unit_cm: float) -> str:
     # Halves up, of the decimals that are shown: 27.5 units of 2.54 cm are 69.9 cm.
     shown = Decimal(f"{height * unit_cm:.6g}").quantize(Decimal("0.1"), ROUND_HALF_UP)
     return (
-        f"height {height:.3g} units = {shown:,} cm, which is no person's; "
+        f"height {height:.3g} units = {shown:,} cm, which is not human; "
         f"is 1 unit = {unit_cm:.6g} cm right?"
     )

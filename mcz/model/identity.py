@@ -1,4 +1,4 @@
-"""``IdentityCache``: results of a function of large unchanging things, found by their identity."""
+"""``IdentityCache``: results of a function of large immutable objects, looked up by identity."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Result = TypeVar("Result")
 
 
 class IdentityCache(Generic[Result]):
-    """``function`` of things that nobody changes; the last results are kept, with the things.
+    """``function`` of immutable objects; caches the last results, with the objects.
 
     A hash of a tuple of many grids, say, takes longer than much that is derived from it.
     """
@@ -19,11 +19,11 @@ class IdentityCache(Generic[Result]):
         self._function = function
         self._known: dict[tuple[int, ...], tuple[tuple[object, ...], Result]] = {}
 
-    def __call__(self, *things: object) -> Result:
-        key = tuple(map(id, things))
+    def __call__(self, *objects: object) -> Result:
+        key = tuple(map(id, objects))
         entry = self._known.get(key)
         if entry is None:
-            entry = things, self._function(*things)
+            entry = objects, self._function(*objects)
             if len(self._known) >= MOST:
                 self._known.clear()  # as other threads may do: nothing is iterated over
             self._known[key] = entry

@@ -109,8 +109,11 @@ def test_other_signals_as_npz(folder: Path, call: Call) -> None:
         (["--signal", "analog"], "--signal needs --to csv or --to npz"),
         (["--signal", "analog", "--to", "c3d"], "--signal needs --to csv or --to npz"),
         (["--stored", "--to", "csv"], "--stored needs --signal"),
-        (["--signal", "analog", "--to", "csv", "--joints", "p0"], "goes with none of --joints"),
-        (["--signal", "emg", "--to", "csv"], "no signal 'emg', but motion, residuals, outputs"),
+        (["--signal", "analog", "--to", "csv", "--joints", "p0"], "--signal excludes --joints"),
+        (
+            ["--signal", "emg", "--to", "csv"],
+            "no signal 'emg'; its signals are motion, residuals, outputs",
+        ),
         (["--up", "y", "--to", "csv"], "--up needs --to c3d"),
     ],
 )

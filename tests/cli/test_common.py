@@ -12,7 +12,7 @@ import click
 import pytest
 
 import mcz
-from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, about, run, table, write_output
+from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, errors_about, run, table, write_output
 from mcz.cli.lazy import OTHER_NAMES
 from mcz.cli.main import COMMANDS, cli
 from mcz.cli.terminal import Progress, say
@@ -23,7 +23,7 @@ from tests.motions import smooth
 def outcome(capsys: pytest.CaptureFixture[str], error: Exception) -> tuple[int, str]:
     @click.command()
     def command() -> None:
-        with about("walk.mcz"):
+        with errors_about("walk.mcz"):
             raise error
 
     code = run(command, "mcz", [])

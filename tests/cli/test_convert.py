@@ -125,9 +125,9 @@ def test_to_and_from_mcz(folder: Path, call: Call) -> None:
     assert call("convert", folder / "w.mcz", folder / "again.bvh")[1].endswith(", restored\n")
     assert (folder / "again.bvh").read_bytes() == (folder / "walk.bvh").read_bytes()
     refused = {
-        ("w.mcz", "v.mcz"): "mcz extract takes clips out of an .mcz",
+        ("w.mcz", "v.mcz"): "use mcz extract for clips of an .mcz",
         ("walk.bvh", "v.mcz", "--frames", "0:9"): "mcz extract takes parts",
-        ("w.mcz", "v.csv", "--skeleton", "none"): "are of source files",
+        ("w.mcz", "v.csv", "--skeleton", "none"): "need a source file",
         ("walk.bvh", "v"): "use --to",
         ("walk.bvh", "v.trcc"): "did you mean .trc?",
     }
@@ -148,7 +148,7 @@ def test_a_part_in_its_own_format(folder: Path, call: Call) -> None:
 
 def test_decode_of_a_source_wants_an_output(folder: Path, call: Call) -> None:
     code, _, err = call("decode", folder / "walk.bvh", "--force")
-    assert code == 2 and "a source file, no .mcz" in err
+    assert code == 2 and "a source file, not an .mcz" in err
     code, _, err = call("decode", folder / "walk.bvh", "-o", folder / "x.csv", "--salvage")
     assert code == 2 and "need an .mcz" in err
     assert call("decode", folder / "walk.bvh", "--to", "csv")[0] == 0

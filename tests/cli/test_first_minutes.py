@@ -128,7 +128,7 @@ def test_a_unit_that_is_none_is_refused(unit: str, folder: Path, call: Call) -> 
 
 def test_a_height_that_is_no_persons_is_remarked_upon(folder: Path, call: Call) -> None:
     code, _, errors = call("encode", "walk.bvh", "--unit", "mm", "-o", "u.mcz")
-    note = "height 166 units = 16.6 cm, which is no person's; is 1 unit = 0.1 cm right?"
+    note = "height 166 units = 16.6 cm, which is not human; is 1 unit = 0.1 cm right?"
     assert (code, errors) == (0, f"mcz: walk.bvh: {note}\n")
     assert note in call("info", "u.mcz")[1]
     assert call("encode", "walk.bvh", "--unit", "cm", "-o", "v.mcz")[2] == ""

@@ -183,7 +183,7 @@ def test_what_is_kept_has_one_format(folder: Path, call: Call) -> None:
     call("encode", folder / "walk.asf")
     code, _, errors = call("decode", folder / "walk.mcz", "-o", folder / "x.bvh")
     assert code == 2
-    assert "walk.asf, which is not converted to .bvh" in errors
+    assert "walk.asf, which cannot be converted to .bvh" in errors
     assert call("decode", folder / "walk.mcz", "-o", folder / "x.asf")[0] == 0
 
 
@@ -237,7 +237,7 @@ def test_an_option_given_twice_is_an_error(name: str, call: Call) -> None:
     for words, given in single_options(command, (name,)):
         code, out, errors = call(*words, *given)
         assert (code, out) == (2, ""), given
-        assert "is given 2 times, and takes one" in errors, given
+        assert "is given 2 times; give it once" in errors, given
         assert f"see mcz {' '.join(words)} --help" in errors
 
 

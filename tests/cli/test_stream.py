@@ -177,7 +177,7 @@ def test_parameters_change_by_a_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"", "the first line should be names"),
+        (b"", "its first line must be names"),
         (b"\n1\n", "need"),
         (b"a\xff,b\n", "not a line of names"),
         (NAMES + b"1,2\n", "line 2: 2 values of 6"),

@@ -24,7 +24,7 @@ def listen(token: str | None = TOKEN) -> Iterator[tcp.Listener]:
 
 
 def test_who_knows_the_token_gets_the_stream() -> None:
-    with listen() as listener, tcp.connected(listener.address, TOKEN) as stream:
+    with listen() as listener, tcp.connect(listener.address, TOKEN) as stream:
         assert stream.read(7) == b"opening"
         listener.wait_for(1)
         listener.entry = lambda: 0
@@ -53,7 +53,7 @@ def test_a_silent_client_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -
     with (
         listen() as listener,
         socket.create_connection(tcp.address_of(listener.address)) as silent,
-        tcp.connected(listener.address, TOKEN) as stream,
+        tcp.connect(listener.address, TOKEN) as stream,
     ):
         assert stream.read(7) == b"opening"
         assert silent.recv(10) == b""
@@ -65,13 +65,13 @@ def test_a_silent_client_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -
 def test_a_client_is_told(given: str | None, hint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, "PATIENCE", 0.2)
     with listen() as listener, pytest.raises(Failure) as raised:  # noqa: SIM117
-        with tcp.connected(listener.address, given):
+        with tcp.connect(listener.address, given):
             pass
     assert hint in str(raised.value)
 
 
 def test_a_token_to_one_who_asks_for_none() -> None:
-    with listen(None) as listener, tcp.connected(listener.address, TOKEN) as stream:
+    with listen(None) as listener, tcp.connect(listener.address, TOKEN) as stream:
         assert stream.read(7) == b"opening"
 
 
@@ -89,7 +89,7 @@ def test_what_is_no_token(token: str) -> None:
     ],
 )
 def test_which_addresses_are_of_this_machine(host: str, here: bool) -> None:
-    assert tcp.is_here(host) is here
+    assert tcp.is_local(host) is here
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,9 @@ def test_analog_is_in_units_and_words_are_kept(processor: int, size: int) -> Non
         assert np.array_equal(again.values, wanted)
         assert np.array_equal(again.stored, analog.stored)
         assert not mcz.verify(stream.getvalue())
-        with pytest.raises(OptionError, match="no signal 'emg', but motion, residuals, analog"):
+        with pytest.raises(
+            OptionError, match="no signal 'emg'; its signals are motion, residuals, analog"
+        ):
             clip.read(signal="emg")
 
 

@@ -16,7 +16,7 @@ import pytest
 import mcz
 from mcz import AccessError
 from mcz.show.viewing import page
-from mcz.show.viewing.page import built
+from mcz.show.viewing.page import build_page
 
 ROOT = Path(mcz.__file__).parents[1]
 PAGE = Path(__file__).with_name("page.html")
@@ -60,11 +60,11 @@ def set_mtime(path: Path, seconds: int) -> None:
 
 def test_it_is_built_once_and_when_sources_change(checkout: Path, programs: list[str]) -> None:
     said: list[str] = []
-    built_page = built(said.append, checkout)
+    built_page = build_page(said.append, checkout)
     assert built_page.read_bytes() == PAGE.read_bytes()
     assert programs == ["npm ci --no-audit --no-fund", "node build.mjs"]
     assert len(said) == 2
-    assert built(said.append, checkout) == built_page
+    assert build_page(said.append, checkout) == built_page
     assert len(programs) == 2
     viewer = checkout / page.VIEWER
     made = (built_page, viewer / "node_modules" / ".package-lock.json")
@@ -73,12 +73,12 @@ def test_it_is_built_once_and_when_sources_change(checkout: Path, programs: list
             set_mtime(path, 200)
         set_mtime(checkout / name, 300)
         programs.clear()
-        built(said.append, checkout)
+        build_page(said.append, checkout)
         assert programs == ["node build.mjs"]
         set_mtime(checkout / name, 100)
     set_mtime(viewer / "package-lock.json", 2**32)  # the one thing that what was fetched depends on
     programs.clear()
-    built(said.append, checkout)
+    build_page(said.append, checkout)
     assert programs == ["npm ci --no-audit --no-fund", "node build.mjs"]
 
 
@@ -87,20 +87,20 @@ def test_without_npm_the_command_is_said(
 ) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(AccessError, match=r"\(cd tools/viewer && npm ci && npm run build\)"):
-        built(lambda line: None, checkout)
+        build_page(lambda line: None, checkout)
     built_page = checkout / page.VIEWER / "dist" / "viewer.html"
     built_page.parent.mkdir()
     built_page.write_bytes(PAGE.read_bytes())
     set_mtime(built_page, 50)
     said: list[str] = []
-    assert built(said.append, checkout) == built_page
+    assert build_page(said.append, checkout) == built_page
     assert "older than its sources" in said[0]
     assert not programs
 
 
 def test_an_installation_without_it_says_so(tmp_path: Path) -> None:
     with pytest.raises(AccessError, match="its wheel was built without"):
-        built(lambda line: None, tmp_path)
+        build_page(lambda line: None, tmp_path)
 
 
 def test_a_build_that_fails_says_why(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,7 +110,7 @@ def test_a_build_that_fails_says_why(checkout: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(subprocess, "run", run)
     monkeypatch.setattr(shutil, "which", lambda name: f"/bin/{name}")
     with pytest.raises(AccessError, match="npm ci --no-audit --no-fund in .* said: no network"):
-        built(lambda line: None, checkout)
+        build_page(lambda line: None, checkout)
 
 
 @pytest.mark.parametrize("has_page", [True, False])

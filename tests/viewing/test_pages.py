@@ -228,7 +228,7 @@ def test_what_a_codec_needs_is_there(tmp_path: Path) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("no node")
-    from mcz.show.viewing.embedding import deflated
+    from mcz.show.viewing.embedding import deflate_annexes
 
     motion = smooth(40)
     documents = []
@@ -236,7 +236,7 @@ def test_what_a_codec_needs_is_there(tmp_path: Path) -> None:
         mcz.write(motion, tmp_path / "a.mcz", name, force=True)
         data = (tmp_path / "a.mcz").read_bytes()
         with mcz.open(data) as file:
-            tables = deflated(tables_for(file))
+            tables = deflate_annexes(tables_for(file))
         document = {"files": [{"base64": base64.b64encode(data).decode()}], "annex": tables}
         documents.append(tmp_path / f"{number}.json")
         documents[-1].write_text(json.dumps(document))

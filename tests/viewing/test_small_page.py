@@ -12,7 +12,7 @@ import mcz
 from mcz import AccessError
 from mcz.show.viewing import page
 from mcz.show.viewing.file_registry import FileRegistry, add_path
-from mcz.show.viewing.page import built
+from mcz.show.viewing.page import build_page
 from mcz.show.viewing.player import MOST_CLIPS, viewer_page
 from mcz.show.viewing.server import Server
 from tests.viewing.asking import ask
@@ -24,7 +24,7 @@ def without_npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / page.VIEWER).mkdir(parents=True)
     (tmp_path / page.VIEWER / "build.mjs").touch()
     monkeypatch.delenv(page.OTHER, raising=False)
-    monkeypatch.setattr(page, "built", lambda say: built(say, tmp_path))
+    monkeypatch.setattr(page, "built", lambda say: build_page(say, tmp_path))
     monkeypatch.setattr(shutil, "which", lambda name: None)
 
 

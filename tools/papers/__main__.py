@@ -10,7 +10,7 @@ import click
 
 from mcz.bench.tasks import Cache, Runner, default_folder
 from mcz.cli.bench import show
-from mcz.cli.common import Exit, about, existing, run
+from mcz.cli.common import Exit, errors_about, require_file, run
 from mcz.cli.options import json_option, unit_option
 from mcz.cli.terminal import Progress
 from tools.papers.hou2016.run import hou2016
@@ -54,12 +54,12 @@ def command(
     """
     for path in clips:
         if not Path(path).is_dir():
-            existing(path)
+            require_file(path)
     runner = Runner(
         jobs or os.cpu_count() or 1, Cache(default_folder() if cache else None, CODE), KINDS
     )
     outcome = Outcome()
-    with Progress() as progress, about(clips[0]):
+    with Progress() as progress, errors_about(clips[0]):
         runner.progress = progress
         for name in PAPERS if paper == "all" else (paper,):
             PAPERS[name](outcome, clips, unit, runner)

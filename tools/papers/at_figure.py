@@ -29,7 +29,9 @@ def at_figure(case: Case, variant: Variant, key: str, wanted: float, hint: float
     points: dict[float, Record] = {}
 
     def figure(setting: float) -> float:
-        found = measure(case, variant, {dial.parameter: settings.given(setting)}, markers=False)
+        found = measure(
+            case, variant, {dial.parameter: settings.to_parameter(setting)}, markers=False
+        )
         points[setting] = found
         if found[key] is None:
             raise OptionError(f"{variant.label}: this clip has no {key}")

@@ -112,7 +112,7 @@ def curve(case: Case, variant: Variant, data: str = "") -> list[Record]:
             variant = replace(variant, params=(*variant.params, ("basis", str(path))))
 
         def measure(setting: float) -> Record:
-            return point_of(loaded, variant, {dial.parameter: settings.given(setting)})
+            return point_of(loaded, variant, {dial.parameter: settings.to_parameter(setting)})
 
         return walk(measure, settings.snap(_start(loaded, variant)), settings.snap)
 
@@ -177,7 +177,7 @@ def speeds_beside(case: Case, settings: Sequence[tuple[Variant, float]]) -> list
     rows = []
     for variant, setting in settings:
         dial, given = dial_of(variant)
-        params = variant.options({dial.parameter: given.given(setting)})
+        params = variant.options({dial.parameter: given.to_parameter(setting)})
         encode, decode = codec_calls(motion, variant.codec, params)
         row = {"label": variant.label, "setting": setting, "live": False}
         seconds = {"encode": cpu_seconds(encode), "decode": cpu_seconds(decode)}

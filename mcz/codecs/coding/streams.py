@@ -62,7 +62,7 @@ def decode_stream(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: b
 
 
 def scale_of(halves: int) -> int:
-    """The scale of so many half octaves, about 2^(h / 2)."""
+    """The scale of a number of half octaves, about 2^(halves / 2)."""
     return (2 + (halves & 1)) << (halves >> 1) >> 1
 
 

@@ -99,7 +99,7 @@ class Coder:
         self._analysis = np.zeros((0, 0))
 
     def skip(self, n_frames: int) -> None:
-        """Skip so many lost frames."""
+        """Skip ``n_frames`` lost frames."""
         self.at += n_frames
         self._whole = self._whole and not n_frames
 

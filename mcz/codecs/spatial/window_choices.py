@@ -330,7 +330,7 @@ def parameters_of(presets: Presets, window: int) -> tuple[Parameter, ...]:
         Parameter(
             "threshold",
             None,
-            f"coefficients below so many steps become 0; default {THRESHOLD}",
+            f"threshold in steps, below which coefficients become 0; default {THRESHOLD}",
             number("threshold", 0.5, 2.0**20),
         ),
         Parameter(

@@ -57,7 +57,7 @@ class Wavelet:
         return out
 
     def lead(self, levels: int) -> int:
-        """The frames before its own that the first coefficient of a segment bears upon."""
+        """The frames before its own that the first coefficient of a segment affects."""
         return (self.n_taps - 2) * ((1 << levels) - 1)
 
     def mirrored(self, levels: int) -> int:

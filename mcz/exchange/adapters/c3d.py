@@ -60,7 +60,7 @@ def to_c3d(motion: Motion) -> Reader:
         raise MotionError(f"c3d cannot read it: {error}", clip=motion.name) from error
 
 
-def for_c3d(motion: Motion) -> Motion:
+def as_c3d_motion(motion: Motion) -> Motion:
     """``motion`` itself where its source is a C3D, else its points as markers."""
     if motion.source is not None and motion.source.format in (FORMAT, OUTPUTS_FORMAT):
         return motion
@@ -69,7 +69,7 @@ def for_c3d(motion: Motion) -> Motion:
 
 def c3d_bytes(motion: Motion) -> bytes:
     """The C3D file of a motion: its source's, or a plain one of its points."""
-    data: bytes = FORMATS["c3d"].write(for_c3d(motion))
+    data: bytes = FORMATS["c3d"].write(as_c3d_motion(motion))
     return data
 
 
@@ -113,7 +113,7 @@ def to_ezc3d(motion: Motion) -> c3d:
     where ezc3d cannot read that file, and as ``mcz.convert(motion, "c3d")``.
     """
     ezc3d = import_extra("ezc3d", "ezc3d")
-    plain = for_c3d(motion)
+    plain = as_c3d_motion(motion)
     data = c3d_bytes(plain)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "motion.c3d")

@@ -9,7 +9,12 @@ import numpy as np
 
 from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion.hierarchy import to_amc, to_bvh
-from mcz.exchange.conversion.losses import COUNTING, left_out, with_counted_times, with_held_signals
+from mcz.exchange.conversion.losses import (
+    COUNTING,
+    drop_time_signal,
+    keep_supported_signals,
+    left_out,
+)
 from mcz.exchange.conversion.marker_fit import Fit, from_positions
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import Hint
@@ -117,8 +122,8 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     timeline = motion.timeline
     if timeline is not None and FORMATS[to].is_table:  # prints as the source
         timeline = Timeline(timeline.times, timeline.rate)
-    made = replace(TARGETS[to](with_held_signals(motion, to)), source=None).at_times(timeline)
-    return with_counted_times(made, to) if to in COUNTING else made
+    made = replace(TARGETS[to](keep_supported_signals(motion, to)), source=None).at_times(timeline)
+    return drop_time_signal(made, to) if to in COUNTING else made
 
 
 def converted_files(

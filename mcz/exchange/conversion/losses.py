@@ -26,7 +26,7 @@ HELD_ROLES = {"c3d": KNOWN}  # roles of signals other than the motion, of the fo
 ROOT = "root"  # the only name that ASF has for it
 
 
-def with_held_signals(motion: Motion, to: str) -> Motion:
+def keep_supported_signals(motion: Motion, to: str) -> Motion:
     """``motion`` with only the signals that a format of ``mcz.convert`` can hold."""
     roles = HELD_ROLES.get(to, ())
     return motion.with_signals(
@@ -50,17 +50,17 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
     others = [s.name for s in motion.signals[1:] if s.role not in (TIMES, *known)]
     if others:
         yield f"left out: signal {', '.join(others)}"
-    yield from of_text(motion.metadata)
+    yield from text_columns(motion.metadata)
     names = [channel.label for channel in motion.skeleton.channels if not channel.kind]
     if names and to in (*POINTS, *SCENES) and point_set(motion.skeleton) != "markers":
         more = " ..." if len(names) > MOST_NAMES else ""
         yield f"left out: {', '.join(names[:MOST_NAMES])}{more}, which move nothing"
-    yield from of_recording(recording(motion))
+    yield from recording_facts(recording(motion))
     if to == "c3d":
         yield from _groups(motion)
     yield from _numbers(motion, to)
     if to in COUNTING:
-        yield from lost_times(motion, to)
+        yield from describe_lost_times(motion, to)
     if to == "amc":
         yield from _acclaim_names(motion)
 
@@ -88,13 +88,13 @@ def _acclaim_names(motion: Motion) -> Iterator[str]:
         yield f"ASF cannot hold the joint names {shown}: they have _ instead"
 
 
-def of_text(metadata: Mapping[str, str]) -> Iterator[str]:
+def text_column_note(metadata: Mapping[str, str]) -> Iterator[str]:
     """The columns of text of a table: no other file has them."""
     if texts := text_columns(metadata):
         yield f"left out: columns of text: {texts}"
 
 
-def of_recording(recorded: Recording | None) -> Iterator[str]:
+def recording_facts(recorded: Recording | None) -> Iterator[str]:
     """Yield the facts of a C3D besides its numbers, which no other file, nor a plain C3D, has."""
     if recorded is None:
         return
@@ -134,7 +134,7 @@ def _numbers(motion: Motion, to: str) -> Iterator[str]:
 COUNTING = ("bvh", "amc", "c3d")
 
 
-def with_counted_times(motion: Motion, to: str) -> Motion:
+def drop_time_signal(motion: Motion, to: str) -> Motion:
     """``motion`` for a file that counts frames: without a signal of times.
 
     The first frame of a C3D has the number that implies its time.
@@ -162,7 +162,7 @@ def first_number(motion: Motion) -> int:
     return round(first)
 
 
-def lost_times(motion: Motion, to: str) -> Iterator[str]:
+def describe_lost_times(motion: Motion, to: str) -> Iterator[str]:
     """Times that such a file cannot state, in words: their begin, and breaks."""
     line, rate, name = motion.timeline, motion.frame_rate, to.upper()
     if line is None or not len(line.times):

@@ -78,7 +78,7 @@ class FolderCache:
     """Blocks as files of a folder, at most ``most_bytes`` of them; what is there stays there.
 
     Processes may share it: a file gets its name when it is whole, and one that is not what was
-    written is made anew. Raises AccessError where the folder cannot be used.
+    written is created again. Raises AccessError where the folder cannot be used.
     """
 
     SUFFIX = ".features"

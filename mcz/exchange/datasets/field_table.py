@@ -118,7 +118,7 @@ def _up_column(skeleton: Skeleton) -> int:
 class _Heading:
     """The frame that turns with the root about the up axis, its origin on the ground below it.
 
-    ``angles`` (n_frames,) in radians, 0 in the rest pose, as of ``Root.headings``; ``axes``
+    ``angles`` (n_frames,) in radians, 0 in the rest pose, as in ``Root.headings``; ``axes``
     (n_frames, 3, 3) has the axes of the frame as columns.
     """
 

@@ -63,8 +63,8 @@ def dataset(
     name of any signal; docs/guides/datasets.md has their shapes. ``rate``: all are resampled to it,
     exactly where every n-th frame will do; ``source_rate`` is that of clips that do not say theirs.
     ``window`` frames each, every ``stride`` (as many, where None); None: whole clips. ``where``
-    chooses clips: an expression as of ``File.find``, or a function of a Clip. ``joints`` and
-    ``unit`` as of ``positions``; ``up`` is the axis that points up where skeletons do not say it.
+    chooses clips: an expression as in ``File.find``, or a function of a Clip. ``joints`` and
+    ``unit`` as in ``positions``; ``up`` is the up axis of skeletons that do not state it.
     ``normalize``: see ``Dataset.normalized``.
     ``cache``: bytes to keep in memory, or in ``folder``, across runs: "256 MB".
 

@@ -126,7 +126,7 @@ class Sources:
         return file.clips[member.clip]
 
     def close(self) -> None:
-        """Close what was opened here; it is opened anew when it is needed."""
+        """Close what was opened here; it is reopened when needed."""
         with self._lock:
             _close(self._open)
 

@@ -10,7 +10,7 @@ from mcz.exchange.datasets.fields import Field, SignalShape, Subject, Units
 from mcz.files.reading.clip import Clip
 from mcz.kinematics.frames import frame_poses_of
 from mcz.kinematics.poses.motion_like import joint_numbers, scale_to
-from mcz.kinematics.poses.trajectories import chosen_points
+from mcz.kinematics.poses.trajectories import find_points
 from mcz.model.skeleton import Joints
 from mcz.model.text_format import among
 from mcz.model.units import facing
@@ -31,7 +31,7 @@ def subject_of(
         skeleton,
         frame_poses_of(skeleton) if any(each.posed for each in fields) else None,
         tuple(joint_numbers(skeleton, joints)),
-        tuple(chosen_points(skeleton, joints)) if lengths else (),
+        tuple(find_points(skeleton, joints)) if lengths else (),
         scale_to(skeleton, units.length) if lengths else 1.0,
         {each.name: signal_shape(clip, each) for each in fields if each.signal},
     )

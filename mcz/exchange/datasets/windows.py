@@ -47,7 +47,7 @@ class Dataset:
     without a window whole clips. ``data[3:9]`` and ``data[[5, 1]]`` are batches: arrays
     (n, window, ...). The arrays are the caller's own.
 
-    It can be pickled, and each process that a worker is opens the files anew: fork and spawn are
+    It can be pickled, and each process that a worker is opens the files itself: fork and spawn are
     both safe. Threads may share it. Reading raises as ``mcz.open`` and ``Clip.read`` do.
     """
 
@@ -71,7 +71,7 @@ class Dataset:
         self._blocks.sources.adopt(files)
 
     def close(self) -> None:
-        """Close the files that the data set has opened; they are opened anew when needed."""
+        """Close the files that the data set has opened; they are reopened when needed."""
         self._blocks.sources.close()
 
     def __getstate__(self) -> JsonObject:
@@ -317,7 +317,7 @@ class Dataset:
     def batch_sampler(self, size: int, seed: int, workers: int = 1) -> WindowBatchSampler:
         """Batches of ``size`` numbers of windows, for workers that take one each in turn.
 
-        Each worker gets windows of clips of its own. A new order each time, as of ``sampler``.
+        Each worker gets windows of clips of its own. A new order each time, as in ``sampler``.
         """
         return WindowBatchSampler(self, size, seed, workers)
 

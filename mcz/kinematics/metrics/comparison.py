@@ -29,7 +29,7 @@ from mcz.kinematics.metrics.sums import (
     Number,
     PointErrors,
     ShellErrors,
-    times,
+    scale_figure,
 )
 from mcz.kinematics.points import check_radius
 from mcz.model.motion import Motion, Signal, Skeleton
@@ -101,11 +101,11 @@ def compare(
         max_velocity_error_cm_s=velocities[1],
         mean_acceleration_error_cm_s2=accelerations[0],
         max_acceleration_error_cm_s2=accelerations[1],
-        virtual_marker_mean_cm=times(markers.mean, unit),
-        virtual_marker_max_cm=times(markers.greatest, unit),
+        virtual_marker_mean_cm=scale_figure(markers.mean, unit),
+        virtual_marker_max_cm=scale_figure(markers.greatest, unit),
         shell_radius_cm=None if shell.mean is None else errors.shell_cm,
-        shell_mean_cm=times(shell.mean, unit),
-        shell_max_cm=times(shell.greatest, unit),
+        shell_mean_cm=scale_figure(shell.mean, unit),
+        shell_max_cm=scale_figure(shell.greatest, unit),
         shell_where=errors.shell_where(),
         sliding=errors.sliding(),
         by_joint=errors.by_joint(unit),
@@ -277,7 +277,7 @@ class PositionErrors:
         factor = unit
         for _ in range(order):  # overflow gives inf, which is reported as None
             factor *= float(rate * self._original.signals[0].samples_per_frame)
-        return times(errors.mean, factor), times(errors.greatest, factor)
+        return scale_figure(errors.mean, factor), scale_figure(errors.greatest, factor)
 
     def sliding(self) -> Sliding | None:
         """Sliding of the feet during the original's contacts; None if not requested."""
@@ -306,8 +306,8 @@ class PositionErrors:
                 mean_position_error=mean,
                 max_position_error=most,
                 frame=self._frame(row),
-                shell_mean_cm=times(shell_mean, unit),
-                shell_max_cm=times(shell_most, unit),
+                shell_mean_cm=scale_figure(shell_mean, unit),
+                shell_max_cm=scale_figure(shell_most, unit),
                 shell_frame=self._frame(shell_row),
             )
             for name, size, (mean, most, row), (shell_mean, shell_most, shell_row) in zip(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from mcz.kinematics.metrics.sliding import Sliding
-from mcz.kinematics.metrics.sums import Number, times
+from mcz.kinematics.metrics.sums import Number, scale_figure
 from mcz.model.text_format import brief
 
 Entries = dict[str, float | int | str | None]
@@ -42,9 +42,9 @@ class JointFigures:
             "joint": self.joint,
             "points": self.points,
             "mean_position_error": self.mean_position_error,
-            "mean_position_error_cm": times(self.mean_position_error, self.unit_cm),
+            "mean_position_error_cm": scale_figure(self.mean_position_error, self.unit_cm),
             "max_position_error": self.max_position_error,
-            "max_position_error_cm": times(self.max_position_error, self.unit_cm),
+            "max_position_error_cm": scale_figure(self.max_position_error, self.unit_cm),
             "max_position_error_frame": self.frame,
             "shell_mean_cm": self.shell_mean_cm,
             "shell_max_cm": self.shell_max_cm,
@@ -97,11 +97,11 @@ class Comparison:
 
     @property
     def mean_position_error_cm(self) -> Number:
-        return times(self.mean_position_error, self.unit_cm)
+        return scale_figure(self.mean_position_error, self.unit_cm)
 
     @property
     def max_position_error_cm(self) -> Number:
-        return times(self.max_position_error, self.unit_cm)
+        return scale_figure(self.max_position_error, self.unit_cm)
 
     def entries(self) -> Entries:
         """The figures by the metric ids of SPEC.md, in its order."""

@@ -19,7 +19,7 @@ def mean_of(total: float, n: int) -> Number:
     return total / n if n and math.isfinite(total) else None
 
 
-def times(value: Number, factor: Number) -> Number:
+def scale_figure(value: Number, factor: Number) -> Number:
     if value is None or factor is None:
         return None
     return mean_of(value * factor, 1)

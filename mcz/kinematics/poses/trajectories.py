@@ -40,10 +40,10 @@ def point_names(moving: MotionLike | Skeleton, joints: Joints = None) -> tuple[s
     """
     skeleton = moving if isinstance(moving, Skeleton) else moving.skeleton
     names = names_of_points(skeleton)
-    return names if joints is None else tuple(names[p] for p in chosen_points(skeleton, joints))
+    return names if joints is None else tuple(names[p] for p in find_points(skeleton, joints))
 
 
-def chosen_points(skeleton: Skeleton, joints: Joints) -> list[int]:
+def find_points(skeleton: Skeleton, joints: Joints) -> list[int]:
     """The points of these names, and the first point of each joint of these names or indices.
 
     Raises MotionError for an unknown one.
@@ -85,7 +85,7 @@ def positions(
 
 
 def _positions(moving: MotionLike, joints: Joints, span: tuple[int, int]) -> Floats:
-    points = chosen_points(moving.skeleton, joints)
+    points = find_points(moving.skeleton, joints)
     poses = poses_of(moving.skeleton)
     needed = poses.above(poses.joints_of(points))
     return poses.positions(values_of(moving, span, needed), points)

@@ -54,7 +54,7 @@ def _check_names(source: Skeleton, target: Skeleton) -> None:
     for one, other, where in ((source, target, "skeleton"), (target, source, "motion")):
         known = set(other.joint_names)
         for name, joint in zip(one.joint_names, one.joints, strict=True):
-            if turns(joint.channels) and name not in known:
+            if is_turning(joint.channels) and name not in known:
                 raise OptionError(
                     f"retarget: the {where} has no joint {name!r}, which rotates; map it with "
                     "joint_map=, which leaves out unmapped joints"
@@ -72,12 +72,12 @@ def nearest_above(skeleton: Skeleton, joint: int, chosen: Mapping[int, int]) -> 
 COMPUTED = Grid(GridKind.FIXED, 6)  # as of conversions: a millionth is far below noise
 
 
-def turns(channels: tuple[Channel, ...]) -> bool:
+def is_turning(channels: tuple[Channel, ...]) -> bool:
     """Return True if one of the channels turns its joint."""
     return any(channel.kind in TURNING_KINDS for channel in channels)
 
 
-def moves(channels: tuple[Channel, ...]) -> bool:
+def is_moving(channels: tuple[Channel, ...]) -> bool:
     """Return True if one of the channels moves its joint."""
     return any(channel.kind in POSITION_KINDS for channel in channels)
 

@@ -21,8 +21,8 @@ from mcz.kinematics.rest_pose import rest_positions
 from mcz.kinematics.retargeting.matching import (
     check_channels,
     computed_signal,
+    is_moving,
     match_joints,
-    moves,
     nearest_above,
     replace_motion,
 )
@@ -246,7 +246,7 @@ class Travel:
                 carrier = self._carrier(joint, other)
                 if carrier >= 0 and carrier not in ways:
                     ways[carrier] = self._way(joint, other)
-            elif moves(self.target.joints[joint].channels):
+            elif is_moving(self.target.joints[joint].channels):
                 step = self.scale * self._step(other)
                 ways[joint] = to_world(inverse(rest[above]), step)
         for joint, way in ways.items():
@@ -260,7 +260,7 @@ class Travel:
         -1 where none has any, and none is needed. Raises OptionError.
         """
         carrier = joint
-        while carrier >= 0 and not moves(self.target.joints[carrier].channels):
+        while carrier >= 0 and not is_moving(self.target.joints[carrier].channels):
             carrier = self.target.joints[carrier].parent
         place = self.origins[:, other]
         known = place[np.isfinite(place).all(axis=1)]

@@ -35,7 +35,7 @@ Item: TypeAlias = int | bytes | str
 Row: TypeAlias = tuple[Item, ...]
 
 MOST_BYTES = 8  # of a varint
-FEW_VARINTS = 8  # up to so many varints Python reads sooner than NumPy
+FEW_VARINTS = 8  # up to this number, Python is faster than NumPy
 
 
 class Table(Sequence[R], Generic[R]):

@@ -66,7 +66,7 @@ class Body:
 
 
 def body_of(skeleton: Skeleton) -> Body:
-    """The body of a skeleton in any pose; ``fitted`` removes false bones."""
+    """The body of a skeleton in any pose; ``remove_false_bones`` removes false bones."""
     tails = [(n, joint) for n, (joint, tail) in enumerate(listed_points(skeleton)) if tail >= 0]
     n_joints, bones = skeleton.n_joints, []
     offsets: dict[int, list[Floats]] = {}  # an Acclaim bone ends where the next ones begin
@@ -95,7 +95,7 @@ def _heads(skeleton: Skeleton, bones: Ints, owners: Ints) -> Ints:
     return np.flatnonzero(named[bones[:, 1]] & ~np.isin(bones[:, 1], going_on))
 
 
-def fitted(body: Body, places: Floats) -> Body:
+def remove_false_bones(body: Body, places: Floats) -> Body:
     """``body`` without false bones in these frames: stems from a root, varying or zero lengths.
 
     ``places`` (n_frames, n_nodes, 3), at least one frame.
@@ -108,7 +108,7 @@ def fitted(body: Body, places: Floats) -> Body:
     counts = np.bincount(parents[parents >= 0], minlength=n_joints)
     starts, ends = body.bones.T
     only = (parents[starts] < 0) & (counts[starts] == 1) & (ends < n_joints)
-    size = size_of(np.delete(places, starts[only], axis=1))
+    size = figure_size(np.delete(places, starts[only], axis=1))
     with np.errstate(invalid="ignore"):
         rubber = (high - low > MOST_VARIATION * usual) & (usual > 0.1 * size)
         kept = ~rubber & (usual > LEAST_LENGTH * size)
@@ -138,7 +138,7 @@ def bone_lengths(body: Body, places: Floats) -> Floats:
     return np.where(np.isfinite(lengths), lengths, np.nan)
 
 
-def size_of(places: Floats) -> float:
+def figure_size(places: Floats) -> float:
     """The usual extent of all nodes of a frame, along its greatest axis; 1.0 without nodes.
 
     Nodes that are ten times as far from the middle as others do not count.
@@ -154,7 +154,7 @@ def size_of(places: Floats) -> float:
 
 def near_others(nodes: Floats) -> Flags:
     """Flags of the nodes of a frame, (n, 3), that are known and not far from all others."""
-    known = known_places(nodes)
+    known = are_known(nodes)
     if not known.any():
         return known
     with np.errstate(all="ignore"):
@@ -163,7 +163,7 @@ def near_others(nodes: Floats) -> Flags:
         return known & np.asarray(apart <= 10 * usual) if usual > 0 else known
 
 
-def known_places(places: Floats) -> Flags:
+def are_known(places: Floats) -> Flags:
     """Flags of the places, (..., 3), with all coordinates known, bool (...)."""
     return np.asarray(np.isfinite(places).all(axis=-1))
 

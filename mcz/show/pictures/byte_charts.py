@@ -20,9 +20,9 @@ from mcz.files.reading.sizes import by_group, byte_shares, clip_sizes
 from mcz.files.writing.clip_writer import file_in_memory
 from mcz.files.writing.planning import prepare
 from mcz.kinematics.metrics import Comparison, compare
-from mcz.kinematics.metrics.sums import times
+from mcz.kinematics.metrics.sums import scale_figure
 from mcz.model.motion import Motion
-from mcz.show.pictures.canvases import Theme, library, rgb
+from mcz.show.pictures.canvases import Theme, import_library, rgb
 from mcz.show.pictures.charts import Chart, Sheet, legend, name_ticks, rows_of, style
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def rate_chart(
     factor, unit = (10.0 * known, "mm") if known is not None else (1.0, "units")
     rows: list[list[object]] = [["codec", "setting", "bytes", f"mean {unit}", f"greatest {unit}"]]
     for point in points:
-        errors = [times(getattr(point.figures, key), factor) for key in FIGURES]
+        errors = [scale_figure(getattr(point.figures, key), factor) for key in FIGURES]
         rows.append([point.codec, point.setting, point.n_bytes, *errors])
     table = Sheet(
         "Bytes and errors",
@@ -174,7 +174,7 @@ def _draw_rates(
 
 
 def _plain_ticks(axes: Axes) -> None:
-    ticker = library("matplotlib.ticker")
+    ticker = import_library("matplotlib.ticker")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(ticker.LogLocator(subs=(1.0, 3.0), numticks=12))
         axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:,.6g}"))

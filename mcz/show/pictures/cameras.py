@@ -77,7 +77,7 @@ def axes_of(view: str, forward: Floats) -> Floats:
     return np.stack([np.cross(above, back), above, back])
 
 
-def framed(axes: Floats, low: Floats, high: Floats, view: Viewport) -> Camera:
+def fit_camera(axes: Floats, low: Floats, high: Floats, view: Viewport) -> Camera:
     """The camera that exactly frames a box, whose corners are along its own axes, (3,) each."""
     middle = (low + high) / 2
     half = np.maximum((high - low) / 2, 1e-9)

@@ -51,7 +51,7 @@ class Canvas:
     """Draws pictures of one size, one after the other; its artists are kept."""
 
     def __init__(self, width: int, height: int, theme: Theme) -> None:
-        collections = library("matplotlib.collections")
+        collections = import_library("matplotlib.collections")
         self.width, self.height = width, height
         self._figure = new_figure(width, height, facecolor=theme.ground)
         axes = self._figure.add_axes((0, 0, 1, 1))
@@ -93,7 +93,7 @@ class Canvas:
 
     def pixels(self) -> Pixels:
         """The picture as red, green, blue, uint8 (height, width, 3)."""
-        with quietly():
+        with plot_context():
             canvas = self._figure.canvas
             canvas.draw()
             image = np.asarray(getattr(canvas, "buffer_rgba")())[:, :, :3]  # noqa: B009 - of Agg's
@@ -101,7 +101,7 @@ class Canvas:
 
     def svg(self, stream: BinaryIO, title: str) -> None:
         """The picture as SVG."""
-        with quietly():
+        with plot_context():
             about = {"Date": None, "Title": printable(title)}
             self._figure.savefig(stream, format="svg", metadata=about)
 
@@ -110,17 +110,17 @@ EXTRAS = {"matplotlib": "plot", "PIL": "plot", "av": "render"}
 PACKAGES = {"PIL": "pillow", "av": "av (PyAV)"}
 
 
-def library(name: str) -> ModuleType:
+def import_library(name: str) -> ModuleType:
     """Import the module ``name``; OptionError names the extra of mcz if it is missing."""
     top = name.partition(".")[0]
     return import_extra(name, EXTRAS[top], package=PACKAGES.get(top, top), purpose="this picture")
 
 
 def new_figure(width: int, height: int, **options: object) -> Figure:
-    """A matplotlib figure of so many pixels, without the global state of pyplot."""
-    library("matplotlib")
-    canvas = library("matplotlib.backends.backend_agg")
-    figure: Figure = library("matplotlib.figure").Figure(
+    """A matplotlib figure of a size in pixels, without the global state of pyplot."""
+    import_library("matplotlib")
+    canvas = import_library("matplotlib.backends.backend_agg")
+    figure: Figure = import_library("matplotlib.figure").Figure(
         figsize=(width / DPI, height / DPI), dpi=DPI, **options
     )
     canvas.FigureCanvasAgg(figure)
@@ -132,9 +132,9 @@ SVG = {"svg.fonttype": "path", "svg.hashsalt": "mcz", "axes.unicode_minus": Fals
 
 
 @contextmanager
-def quietly() -> Iterator[None]:
+def plot_context() -> Iterator[None]:
     """Draw letters that the font lacks as boxes, without a warning, and reproducible SVG."""
-    matplotlib = library("matplotlib")
+    matplotlib = import_library("matplotlib")
     with warnings.catch_warnings(), matplotlib.rc_context(SVG):
         warnings.filterwarnings("ignore", message="Glyph .* missing")
         warnings.filterwarnings("ignore", message="Matplotlib currently does not support")

@@ -271,7 +271,7 @@ def spectrum_chart(motion: Motion, selection: Selection) -> Chart:
 
 
 def _spectrum(series: _Series, rate: float) -> _Series | None:
-    bridged = _bridged(series.numbers)
+    bridged = _bridge_gaps(series.numbers)
     if bridged is None:
         return None
     at, power = density(bridged, rate)
@@ -320,7 +320,7 @@ def _speed(motion: Motion, index: int) -> list[_Series]:
     return [_Series("speed", f"{length_unit(motion)} a second", np.empty(0), speed)]
 
 
-def _bridged(column: Floats) -> Floats | None:
+def _bridge_gaps(column: Floats) -> Floats | None:
     """A channel with unknown values bridged; None if none is known, or one is too large."""
     known = np.isfinite(column) & (np.abs(column) < 1e100)
     if not known.any():

@@ -19,7 +19,7 @@ from mcz.files.writing.atomic import replacing
 from mcz.kinematics.chain import Floats
 from mcz.model.text_format import printable
 from mcz.model.types import Settings
-from mcz.show.pictures.canvases import THEMES, Theme, new_figure, quietly, theme_of
+from mcz.show.pictures.canvases import THEMES, Theme, new_figure, plot_context, theme_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,7 +73,7 @@ def picture_bytes(
     """The picture as bytes of a PNG or an SVG, ``kind`` "png" or "svg"."""
     figure = new_figure(*size, facecolor=theme.ground, layout="constrained")
     out = io.BytesIO()
-    with quietly():
+    with plot_context():
         if titled:
             heading = {"color": theme.ink, "fontsize": 11, "fontweight": "bold", "ha": "left"}
             figure.suptitle(printable(chart.title), parse_math=False, x=0.012, **heading)
@@ -134,11 +134,11 @@ def name_ticks(axes: Axes, places: ArrayLike, names: Sequence[str], most: int) -
 
 def line(axes: Axes, x: Floats, y: Floats, color: str, label: str = "", **options: Any) -> None:
     """A line of many points, of which only the visible ones are drawn; breaks where y is NaN."""
-    x, y = thinned(x, y)
+    x, y = thin_line(x, y)
     axes.plot(x, y, color=color, label=printable(label), **{"linewidth": 1.1} | options)
 
 
-def thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def thin_line(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """The same line with fewer points: of each run of neighbors its least and its greatest."""
     if len(y) <= MOST_POINTS:
         return x, y

@@ -10,7 +10,7 @@ from typing import Any, BinaryIO, Protocol
 import numpy as np
 
 from mcz.errors import OptionError
-from mcz.show.pictures.canvases import Pixels, library
+from mcz.show.pictures.canvases import Pixels, import_library
 
 VIDEO = {
     "mp4": ("libx264", {"crf": "18", "preset": "medium"}),
@@ -32,7 +32,7 @@ def film(stream: BinaryIO, kind: str, width: int, height: int, fps: Fraction) ->
         yield gif
         gif.close()
         return
-    av = library("av")
+    av = import_library("av")
     codec, options = VIDEO[kind]
     with av.open(stream, "w", format=kind) as container:
         try:
@@ -63,8 +63,8 @@ class _Gif:
     """
 
     def __init__(self, stream: BinaryIO, fps: Fraction) -> None:
-        self._image = library("PIL.Image")
-        self._gif = library("PIL.GifImagePlugin")
+        self._image = import_library("PIL.Image")
+        self._gif = import_library("PIL.GifImagePlugin")
         self._stream, self._fps = stream, fps
         self._palette: Any = None
         self._before: Any = None

@@ -13,12 +13,12 @@ from mcz.kinematics import origins_of, positions_of
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.metrics import compare
 from mcz.kinematics.metrics.joint_errors import joint_errors, pairs_of
-from mcz.kinematics.metrics.sums import Distances, times
+from mcz.kinematics.metrics.sums import Distances, scale_figure
 from mcz.model.motion import Motion
 from mcz.model.types import Settings
 from mcz.show.pictures.bodies import MIDDLE
 from mcz.show.pictures.cameras import Viewport
-from mcz.show.pictures.canvases import Theme, library
+from mcz.show.pictures.canvases import Theme, import_library
 from mcz.show.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
 from mcz.show.pictures.channel_charts import times_of
 from mcz.show.pictures.charts import Chart, Sheet, legend, line, name_ticks, number, rows_of, style
@@ -79,8 +79,8 @@ def errors_between(original: Motion, other: Motion) -> Errors:
     joints = [
         (
             each.joint,
-            times(each.mean_position_error, factor),
-            times(each.max_position_error, factor),
+            scale_figure(each.mean_position_error, factor),
+            scale_figure(each.max_position_error, factor),
             each.frame,
         )
         for each in figures.by_joint
@@ -114,8 +114,8 @@ def _by_names(original: Motion, other: Motion) -> Errors:
     joints = [
         (
             name,
-            times(mean, factor),
-            times(most, factor),
+            scale_figure(mean, factor),
+            scale_figure(most, factor),
             None if row is None else row // per_frame,
         )
         for name, (mean, most, row) in zip(figures.joints, groups, strict=True)
@@ -229,7 +229,7 @@ def _draw_figure(
     except MczError:  # nothing to show
         return
     most = max((each[1] or 0.0 for each in errors.joints), default=0.0) or 1.0
-    colors, cm = library("matplotlib.colors"), library("matplotlib.cm")
+    colors, cm = import_library("matplotlib.colors"), import_library("matplotlib.cm")
     scale = cm.ScalarMappable(colors.Normalize(0.0, most), "viridis")
     means = {name: mean for name, mean, _, _ in errors.joints}
     by_joint = np.array(
@@ -261,7 +261,7 @@ def _add_polygons(axes: Axes, track: Track, colors: Floats, theme: Theme) -> Non
     shadows, figures = Shapes(), Shapes()
     add_shadow(shadows, camera, pieces, track.floor, theme)
     add_figure(figures, camera, pieces, theme, track.size)
-    polygons = library("matplotlib.collections").PolyCollection
+    polygons = import_library("matplotlib.collections").PolyCollection
     for shapes in (shadows, figures):
         corners, shades = shapes.arrays()
         axes.add_collection(polygons(corners, facecolors=shades, linewidths=0), autolim=False)

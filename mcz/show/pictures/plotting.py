@@ -17,7 +17,7 @@ from mcz.show.pictures.byte_charts import bytes_chart, rate_chart
 from mcz.show.pictures.channel_charts import Selection, channel_chart, spectrum_chart
 from mcz.show.pictures.charts import Chart, save
 from mcz.show.pictures.error_charts import error_chart
-from mcz.show.pictures.rendering import Progress, checked_size
+from mcz.show.pictures.rendering import Progress, check_size
 
 KINDS = ("channels", "spectrum", "error", "bytes", "rate-distortion")
 CODECS = ("posewave", "mrdwt")  # of a chart of rate and distortion, by default
@@ -73,7 +73,7 @@ def plot(
     if selection != Selection() and what not in ("channels", "spectrum"):
         one = next(each for each in (joint, signal, names) if each is not None)
         raise OptionError(f"a plot of {what} shows all joints, so {one!r} cannot be chosen")
-    size = checked_size(size)
+    size = check_size(size)
     cut = frame_range(moving, frames)
     facts = SourceOptions(rate=rate, unit=unit, up=up)
     chart = _chart(

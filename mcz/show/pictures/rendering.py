@@ -22,10 +22,10 @@ from mcz.model.clock import Timeline
 from mcz.model.types import Ints
 from mcz.show.pictures.bodies import LEFT, RIGHT, Flags
 from mcz.show.pictures.cameras import Viewport
-from mcz.show.pictures.canvases import Canvas, Drawing, Theme, Word, library, theme_of
+from mcz.show.pictures.canvases import Canvas, Drawing, Theme, Word, import_library, theme_of
 from mcz.show.pictures.capsules import Shapes
 from mcz.show.pictures.encoders import film
-from mcz.show.pictures.stages import MARGIN, Stage, drawing_of, shortened, stage_of, words_around
+from mcz.show.pictures.stages import MARGIN, Stage, drawing_of, label_texts, shorten, stage_of
 from mcz.show.pictures.tracks import track_of
 
 FILMS = {".gif": Fraction(25), ".mp4": Fraction(30), ".webm": Fraction(30)}
@@ -102,7 +102,7 @@ def render(
     ExistsError where ``path`` exists and not ``force``.
     """
     suffix = _kind(path, sheet)
-    look = Look(view, theme_of(theme), checked_size(size), follow)
+    look = Look(view, theme_of(theme), check_size(size), follow)
     notes: list[str] = []
     if has_no_lengths(moving.skeleton):
         notes.append(
@@ -119,9 +119,9 @@ def render(
         if timeline is None:
             text = f"its frame rate is unknown: {USUAL_RATE} a second assumed"
             notes.append(Remark(text, Hint.RATE))
-            shown = drawn_frames(first, stop, USUAL_RATE, film_rate, speed)
+            shown = film_frames(first, stop, USUAL_RATE, film_rate, speed)
         else:
-            shown = first + _shown_at(timeline.cut(slice(first, stop)), film_rate, speed)
+            shown = first + _frames_by_time(timeline.cut(slice(first, stop)), film_rate, speed)
         return job.film(shown, film_rate, suffix)
     if sheet is not None:
         return job.sheet(np.linspace(first, stop - 1, sheet).round().astype(np.int64))
@@ -139,11 +139,11 @@ def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
     if sheet is not None and not 1 <= sheet <= MOST_POSES:
         raise OptionError(f"a sheet of {sheet} poses is not possible; draw 1 to {MOST_POSES}")
     for name in NEEDED.get(suffix, ("matplotlib", "PIL")):
-        library(name)  # before any work
+        import_library(name)  # before any work
     return suffix
 
 
-def checked_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
+def check_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
     """Return ``size``; OptionError if a picture cannot have it."""
     if size is not None and not all(SMALLEST <= each <= GREATEST for each in size):
         raise OptionError(
@@ -152,7 +152,7 @@ def checked_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
     return size
 
 
-def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: float) -> Ints:
+def film_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: float) -> Ints:
     """The frame that each picture of a film shows, the nearest in time; at least one.
 
     Raises OptionError for a speed that is not a positive number.
@@ -171,13 +171,13 @@ def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: fl
     return np.minimum(frames, stop - 1)
 
 
-def _shown_at(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
-    """``drawn_frames`` by times: across a break in time the frame before stays."""
+def _frames_by_time(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
+    """``film_frames`` by times: across a break in time the frame before stays."""
     period = timeline.period or 1.0 / USUAL_RATE
     places = np.rint((timeline.regular_times - timeline.regular_times[0]) / period)
     rate, known = Fraction(1 / period).limit_denominator(2**20), timeline.rate
     rate = known if known and abs(float(known) * period - 1) < 1e-6 else rate or Fraction(1, 2**20)
-    shown = drawn_frames(0, int(places[-1]) + 1, rate, fps, speed)
+    shown = film_frames(0, int(places[-1]) + 1, rate, fps, speed)
     return np.asarray(np.searchsorted(places, shown, side="right") - 1, np.int64)
 
 
@@ -220,7 +220,7 @@ class _Job:
             with film(stream, suffix[1:], width, height, fps) as taken:
                 for number, (frame, nodes) in enumerate(stage.track):
                     self.progress(number, len(frames), f"frame {frame}")
-                    words = words_around(stage, width, height, self.moving.name, self._when(frame))
+                    words = label_texts(stage, width, height, self.moving.name, self._when(frame))
                     canvas.draw(drawing_of(stage, number, nodes, words))
                     taken.add(canvas.pixels())
             size = stream.tell()
@@ -231,7 +231,7 @@ class _Job:
         stage = self._stage(frames, width, height, 1.0)
         canvas = Canvas(width, height, self.look.theme)
         ((frame, nodes),) = stage.track
-        words = words_around(stage, width, height, self.moving.name, self._when(frame))
+        words = label_texts(stage, width, height, self.moving.name, self._when(frame))
         canvas.draw(drawing_of(stage, 0, nodes, words))
         return self._rendered(self._write_still(canvas), 1, width, height, None)
 
@@ -284,7 +284,7 @@ def write_still(canvas: Canvas, stream: BinaryIO, suffix: str, title: str) -> No
     if suffix == ".svg":
         canvas.svg(stream, title)
         return
-    image = library("PIL.Image").fromarray(canvas.pixels())
+    image = import_library("PIL.Image").fromarray(canvas.pixels())
     image.save(stream, format="PNG", optimize=True)
 
 
@@ -349,7 +349,7 @@ def sheet_drawing(stage: Stage, layout: Layout, title: str, when: Callable[[int]
 def _heading(stage: Stage, layout: Layout, title: str, top: float, letter: float) -> list[Word]:
     theme, edge = stage.theme, 14.0
     fits = max(4, int((layout.width - 260) / (0.66 * letter)))
-    words = [Word(edge, top, shortened(title, fits), theme.ink, letter, bold=True)]
+    words = [Word(edge, top, shorten(title, fits), theme.ink, letter, bold=True)]
     x = layout.width - edge
     notes = [stage.grid_text]
     notes += [f"{stage.track.up} up assumed"] if stage.track.up_assumed else []

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcz.kinematics.chain import Floats
-from mcz.show.pictures.bodies import LEFT, RIGHT, known_places
-from mcz.show.pictures.cameras import Camera, Viewport, axes_of, framed
+from mcz.show.pictures.bodies import LEFT, RIGHT, are_known
+from mcz.show.pictures.cameras import Camera, Viewport, axes_of, fit_camera
 from mcz.show.pictures.canvases import Drawing, Theme, Word, rgb
 from mcz.show.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
 from mcz.show.pictures.tracks import Track
@@ -66,29 +66,29 @@ def stage_of(
     with None only where the figure would be small otherwise.
     """
     axes = axes_of(view, track.forward)
-    known = known_places(track.centers)
+    known = are_known(track.centers)
     centers = track.centers[known]
     travel = (centers.max(axis=0) - centers.min(axis=0))[:2]
     if follow is None:
         follow = bool(travel.max() > ROAM * track.size)
-    targets = steadied(track.centers, rate) if follow else None
+    targets = smooth_targets(track.centers, rate) if follow else None
     low, high = _box(track, axes, targets)
     margin = ROOM * track.size
-    camera = framed(axes, low - margin, high + margin, port)
+    camera = fit_camera(axes, low - margin, high + margin, port)
     if targets is not None:
         camera_targets = targets + camera.target
         reach = np.full(2, around * track.size)
     else:
         camera_targets, reach = None, travel / 2 + around * track.size
-    square = square_of(track.size, float(reach.max()))
+    square = grid_spacing(track.size, float(reach.max()))
     return Stage(track, theme, camera, camera_targets, reach, square)
 
 
-def steadied(centers: Floats, rate: float) -> Floats:
+def smooth_targets(centers: Floats, rate: float) -> Floats:
     """Targets of a following camera: ``centers`` (n, 3), gaps bridged and smoothed."""
     targets = centers.copy()
     frames = np.arange(len(targets))
-    known = known_places(targets)
+    known = are_known(targets)
     for axis in range(3):
         targets[:, axis] = np.interp(frames, frames[known], targets[known, axis])
     half = min(int(STILL * rate), len(targets) - 1)
@@ -110,7 +110,7 @@ def _box(track: Track, axes: Floats, targets: Floats | None) -> tuple[Floats, Fl
         centers = (track.centers[done : done + len(frames)][:, None] - about) @ axes.T
         with np.errstate(invalid="ignore"):
             near = np.abs(seen - centers).max(axis=2) <= 3 * track.size
-        known = seen[known_places(seen) & near]
+        known = seen[are_known(seen) & near]
         done += len(frames)
         if len(known):
             low, high = np.minimum(low, known.min(axis=0)), np.maximum(high, known.max(axis=0))
@@ -120,14 +120,14 @@ def _box(track: Track, axes: Floats, targets: Floats | None) -> tuple[Floats, Fl
     return low, high
 
 
-def words_around(stage: Stage, width: int, height: int, title: str, when: str) -> list[Word]:
+def label_texts(stage: Stage, width: int, height: int, title: str, when: str) -> list[Word]:
     """Words around a picture."""
     theme, letter = stage.theme, max(9.0, min(15.0, height / 42))
     edge = 0.9 * letter
     top, bottom = height - edge - letter, edge
     fits = max(4, int((width - 2 * edge) / (0.66 * letter)) - len(when) - 2)
     words = [
-        Word(edge, top, shortened(title, fits), theme.ink, letter, bold=True),
+        Word(edge, top, shorten(title, fits), theme.ink, letter, bold=True),
         Word(width - edge, top, when, theme.quiet, letter, "right"),
         Word(width - edge, bottom, stage.grid_text, theme.quiet, letter, "right"),
     ]
@@ -142,9 +142,9 @@ def words_around(stage: Stage, width: int, height: int, title: str, when: str) -
     return words
 
 
-def shortened(text: str, most: int) -> str:
+def shorten(text: str, most: int) -> str:
     """
-    >>> shortened("walk", 8), shortened("a very long name", 8)
+    >>> shorten("walk", 8), shorten("a very long name", 8)
     ('walk', 'a very …')
     """
     return text if len(text) <= most else f"{text[: most - 1]}…"
@@ -163,12 +163,12 @@ MOST_SQUARES = 40  # from side to side
 FADE = 0.55  # of the way to the edge, where lines begin to fade
 
 
-def square_of(size: float, reach: float = 0.0) -> float:
+def grid_spacing(size: float, reach: float = 0.0) -> float:
     """A round length, 1, 2 or 5 times a power of ten, for a figure of that size.
 
     A large floor, with ``reach`` from its middle, has greater squares.
 
-    >>> square_of(170.0), square_of(1.7), square_of(36.0)
+    >>> grid_spacing(170.0), grid_spacing(1.7), grid_spacing(36.0)
     (50.0, 0.5, 10.0)
     """
     length = max(size / SQUARES, 2 * reach / MOST_SQUARES)

@@ -23,17 +23,17 @@ from mcz.show.pictures.bodies import (
     LEFT,
     RIGHT,
     Body,
+    are_known,
     body_of,
-    fitted,
-    known_places,
+    figure_size,
     near_others,
     radii,
-    size_of,
+    remove_false_bones,
 )
 
 BLOCK = 2**19  # numbers a block, which bounds the memory
 SAMPLES = 64  # frames that determine sizes and facing
-MOST_LEAD = 2**14  # greatest number of frames read in vain between two drawn ones
+MOST_LEAD = 2**14  # greatest number of frames that are read, but not drawn, between two drawn ones
 TURNS = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}  # the axes of the file that are x, y, z
 FARTHEST = 1e12  # cm or units from the origin: farther points are unknown
 MOST_SIZES = 300  # sizes of the figure from its usual place: farther points are faults
@@ -86,12 +86,12 @@ def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None)
     unit_cm = skeleton.unit_cm or (unit and unit_cm_of(unit))
     scale = unit_cm or 1.0
     seen = np.concatenate([p for _, p in _blocks(moving, body, chosen, "z", scale)])
-    if not known_places(seen).any():
+    if not are_known(seen).any():
         raise unknown(moving)
-    axis = skeleton.up_axis or up or guessed_up(body, seen)
+    axis = skeleton.up_axis or up or guess_up_axis(body, seen)
     seen = _turned(seen, axis)
-    body = fitted(body, seen)
-    size = size_of(seen[:, body.drawn_nodes])
+    body = remove_false_bones(body, seen)
+    size = figure_size(seen[:, body.drawn_nodes])
     track = Track(
         moving=moving,
         body=body,
@@ -129,9 +129,9 @@ def _measure_track(track: Track) -> Track:
     low = float(np.quantile(heights, 0.02)) if len(heights) else 0.0
     low = 0.0 if 0 <= low < 0.06 * track.size else low - 0.004 * track.size
     middles = np.array(centers).reshape(-1, 3)
-    if not known_places(middles).any():
+    if not are_known(middles).any():
         raise unknown(track.moving)
-    usual = np.median(middles[known_places(middles)], axis=0)
+    usual = np.median(middles[are_known(middles)], axis=0)
     with np.errstate(invalid="ignore"):
         middles[~(np.abs(middles - usual).max(axis=1) <= MOST_SIZES * track.size)] = np.nan
     return replace(track, floor=low, centers=middles)
@@ -169,12 +169,12 @@ def _samples_per_frame(moving: MotionLike) -> int:
     return int(getattr(signal, "samples_per_frame", 0) or signal.layout.samples_per_frame)
 
 
-def guessed_up(body: Body, places: Floats) -> str:
+def guess_up_axis(body: Body, places: Floats) -> str:
     """The axis along which all is farthest from the feet; without feet y, of markers z."""
     feet = find_feet(body.skeleton)
     if feet:
         with np.errstate(all="ignore"):
-            known = known_places(places)
+            known = are_known(places)
             sums = np.where(known[..., None], places, 0.0)
             middle = sums.sum(axis=(0, 1)) / max(1, known.sum())
             low = sums[:, feet].sum(axis=(0, 1)) / max(1, known[:, feet].sum())
@@ -192,7 +192,7 @@ def facing(body: Body, places: Floats) -> Floats:
     across = np.zeros((len(places), 3))
     for side, sign in ((LEFT, 1.0), (RIGHT, -1.0)):
         nodes = places[:, body.sides == side]
-        known = known_places(nodes)
+        known = are_known(nodes)
         count = known.sum(axis=1)
         if not len(nodes) or not nodes.shape[1]:
             return np.array([1.0, 0.0, 0.0])
@@ -202,7 +202,7 @@ def facing(body: Body, places: Floats) -> Floats:
     across[:, 2] = 0.0
     with np.errstate(all="ignore"):
         across /= np.sqrt((across**2).sum(axis=1))[:, None]
-    across = across[known_places(across)]
+    across = across[are_known(across)]
     if not len(across):
         return np.array([1.0, 0.0, 0.0])
     mean = across.mean(axis=0)

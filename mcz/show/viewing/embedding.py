@@ -100,7 +100,7 @@ def write_page(
                 {"name": given[number].name, "base64": base64.b64encode(data).decode()}
                 for number, (data, _) in contents.items()
             ],
-            "annex": deflated(set().union(*map(tables_for, files))),
+            "annex": deflate_annexes(set().union(*map(tables_for, files))),
         }
         if len(files) > 1:
             names = [file.name for file in given]
@@ -249,7 +249,7 @@ def tables_for(file: File) -> set[str]:
     return names
 
 
-def deflated(names: Iterable[str]) -> dict[str, str]:
+def deflate_annexes(names: Iterable[str]) -> dict[str, str]:
     """These annexes by name, each raw deflate in base64."""
     texts = {}
     for name in sorted(names):

@@ -33,7 +33,7 @@ MOST_RESULTS = 16  # files converted from a clip in view: the oldest is deleted 
 MOST_UPLOADS = 256  # files that the page gave
 MCZ = ".mcz"
 FACTS = ("rate", "unit", "up")  # facts that files may lack
-SCAN_FACTOR = 10  # a folder is scanned again after so many times the duration of the last scan
+SCAN_FACTOR = 10  # of the duration of a scan of a folder: pause before the next one
 
 
 class RegisteredFile(Protocol):

@@ -112,7 +112,7 @@ class Handler(BaseHTTPRequestHandler):
         try:
             file = self._site.registry[number]
         except KeyError:
-            raise Refused(404, "there is no such file, or no longer") from None
+            raise Refused(404, "no such file") from None
         with closing(file.open()) as contents:
             headers = {"ETag": contents.tag, "Accept-Ranges": "bytes"}
             check_same(self.headers, contents.tag)

@@ -46,7 +46,7 @@ def page(say: Report | None = None) -> Page:
     if other := os.environ.get(OTHER):
         path = Path(other)
     else:
-        path = PACKAGED if PACKAGED.is_file() else built(say or (lambda line: None))
+        path = PACKAGED if PACKAGED.is_file() else build_page(say or (lambda line: None))
     try:
         return Page(path.read_text("utf-8"), str(path))
     except OSError as error:
@@ -70,7 +70,7 @@ INSTALL = ("ci", "--no-audit", "--no-fund")
 SHOWN = 300  # last characters of the output of a failed program
 
 
-def built(say: Callable[[str], None], root: Path = ROOT) -> Path:
+def build_page(say: Callable[[str], None], root: Path = ROOT) -> Path:
     """The page built from the sources below ``root``; raises AccessError without one.
 
     npm builds it if it is older than its sources. Without npm an old one is used.

@@ -184,7 +184,7 @@ def frames_read(moving: Moving) -> int:
 
 
 def _values(moving: Moving, n_read: int, every: int) -> NDArray[np.float64]:
-    """Every so many frames, (n, n_channels), NaN where invalid."""
+    """Every n-th frame, (n, n_channels), NaN where invalid."""
     if not moving.signals[0].has_poses:
         raise MotionError(
             "the channels of its motion signal differ from those of its skeleton", clip=moving.name

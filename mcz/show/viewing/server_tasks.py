@@ -186,7 +186,7 @@ class ServerTasks:
         try:
             return self._registry[int(match[1]) if match else -1]
         except KeyError:
-            raise Refused(404, "there is no such file, or no longer") from None
+            raise Refused(404, "no such file") from None
 
     @contextmanager
     def _opened(self, asked: Params) -> Iterator[tuple[File, Clip]]:

@@ -180,7 +180,7 @@ def _starts(found: Found) -> Iterator[Row]:
     kept = found.get(found.convergence())
     if not kept:
         return
-    table = Table.of(kept["table"])
+    table = Table.from_cache(kept["table"])
     heads = [head for head, _ in table.columns]
     ratio, share, growth = (heads.index(h) for h in ("haar / dct", "of the fall", "growth"))
     for name, grown in (("Algorithm 1 as published", False), ("ours, with growing P", True)):
@@ -205,7 +205,7 @@ def _sparse(found: Found) -> Iterator[Row]:
     kept = found.get(found.spatial())
     if not kept:
         return
-    rows = {(row[0], row[1]): row[2:] for row in Table.of(kept["fig_5"]).rows}
+    rows = {(row[0], row[1]): row[2:] for row in Table.from_cache(kept["fig_5"]).rows}
     less: dict[str, list[float]] = {}
     for clip in dict.fromkeys(clip for clip, _ in rows if clip != "mean"):
         others = zip(rows[clip, "DCT"], rows[clip, "Haar"], strict=True)

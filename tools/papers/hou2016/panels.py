@@ -33,7 +33,7 @@ def panels(found: Found) -> Iterator[Panels]:
     yield Panels("hou2016_domains", "Channels against positions", axes, tuple(_domain_lines(found)))
     yield Panels("hou2016_sparsity", "Hou 2016, Fig. 4: P", axes, tuple(_sparsity_lines(found)))
     if kept := found.get(found.spatial()):
-        table = Table.of(kept["fig_5"])
+        table = Table.from_cache(kept["fig_5"])
         axes = ("coefficients that are not zero (%)", "mean distance of points (cm)")
         spatial = tuple(_spatial_lines(table))
         yield Panels("hou2016_spatial", "Hou 2016, Fig. 5", axes, spatial, (False, True))

@@ -30,7 +30,7 @@ def measured_convergence(clips: Clips, iterations: int, every: int) -> Record:
     size = max(1, len(frames) * len(found.names))
     lines = [[c.axis, c.growth, c.start, (c.objective / size).tolist()] for c in curves]
     return {
-        "table": convergence_table(curves, len(frames), len(found.names)).kept(),
+        "table": convergence_table(curves, len(frames), len(found.names)).to_cache(),
         "lines": lines,
     }
 
@@ -46,8 +46,8 @@ def measured_distortions(clips: Clips, named: Sequence[Sequence[str]]) -> Record
     by_sparsity = {n: t for n, t in learned.items() if n.startswith(P_ROWS)}
     title = "Hou 2016, Fig. 4: P, for the transform alone"
     return {
-        "fig_5": distortion_table(positions, others | fixed_transforms(n_points)).kept(),
-        "by_sparsity": distortion_table(positions, by_sparsity, title).kept(),
+        "fig_5": distortion_table(positions, others | fixed_transforms(n_points)).to_cache(),
+        "by_sparsity": distortion_table(positions, by_sparsity, title).to_cache(),
     }
 
 

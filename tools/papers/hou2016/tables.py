@@ -36,10 +36,10 @@ def tables(found: Found) -> Iterator[Table]:
     yield _rates(found, preset=False)
     yield _rates(found, preset=True)
     if kept := found.get(found.convergence()):
-        yield Table.of(kept["table"])
+        yield Table.from_cache(kept["table"])
     if kept := found.get(found.spatial()):
-        yield Table.of(kept["fig_5"])
-        yield Table.of(kept["by_sparsity"])
+        yield Table.from_cache(kept["fig_5"])
+        yield Table.from_cache(kept["by_sparsity"])
     yield from (_sparsities(found), _held_out_table(found), _domains(found), _speeds(found))
     yield _ways_back(found)
 

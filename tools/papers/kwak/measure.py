@@ -204,7 +204,7 @@ def file_points(
     loaded = Loaded(motion, b"", load(clip.case).digest)
 
     def measure(setting: float) -> Record:
-        return point_of(loaded, variant, {dial.parameter: settings.given(setting)})
+        return point_of(loaded, variant, {dial.parameter: settings.to_parameter(setting)})
 
     in_places = codec_by_name(variant.codec).positions
     start = STEP_CM / (motion.skeleton.unit_cm or 1.0) / 4 if in_places else 1.0

@@ -56,7 +56,7 @@ def zigzag(data: Bytes, at: int, end: int) -> tuple[int, int]:
 
 
 def skip_ordinal(data: Bytes, at: int, end: int, size: int) -> int:
-    """The offset behind a short ordinal of so many bytes; -1 where there is none."""
+    """The offset after a short ordinal of this many bytes; -1 if there is none."""
     if size > 8 or at + size > end or (size and data[at + size - 1] == 0):  # FAST-21
         return -1
     return at + size

@@ -29,7 +29,7 @@ class Predictors(NamedTuple):
 
 
 def predictors_of(n_lanes: int) -> Predictors:
-    """Room for the predictors of so many lanes."""
+    """Room for the predictors of ``n_lanes``."""
     first, scales, weights = np.zeros((3, n_lanes), np.int32)
     behind = np.zeros((BEHIND, n_lanes), np.int32)
     return Predictors(first, scales, behind, np.zeros(n_lanes, np.int64), weights)
@@ -70,7 +70,7 @@ def is_read(data: Bytes, bit: int, end: int) -> bool:
 def read_row(
     data: Bytes, bits: Ints, ends: Ints, starts: Ints, scales: Words, residuals: Words
 ) -> bool:
-    """Read one residual of each lane, group by group; False for bits that are no codes."""
+    """Read one residual of each lane, group by group; False if bits are not a code."""
     for group in range(len(bits)):
         bit, end = bits[group], ends[group]
         for lane in range(starts[group], starts[group + 1]):

@@ -22,7 +22,7 @@ MOST, CHANGES, LIMIT, FIELDS_END, PREDICTOR = range(READ_SIZE, READ_SIZE + 5)
 PLAN_SIZE = READ_SIZE + 5
 
 LEAD_BITS = 31  # of a lead without its sign
-FEW = 64  # one row in so many may be an exception
+FEW = 64  # one row in 64 may be an exception
 PLAIN_MARGIN = 8  # bits that an exception has more than others, at least
 SEEN_ROWS = 64  # that tell copies apart at first
 HASH_BITS = 42
@@ -150,7 +150,7 @@ def set_limit(column: Ints, plan: Ints, margin: int) -> None:
 
 
 def most_within(column: Ints, plan: Ints) -> int:
-    """The greatest magnitude of those that are no exceptions."""
+    """The greatest magnitude, exceptions aside."""
     if plan[LIMIT] < 0:
         return int(plan[MOST])
     most = 0

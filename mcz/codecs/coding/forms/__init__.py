@@ -12,7 +12,7 @@ PRODUCTS = 33  # odd numbers, shifts and a unit, to a decimal grid
 COUNTS = 34  # integers that a law makes numbers, and rests
 WITH_UNIT = MULTIPLES, PRODUCTS, COUNTS
 BINARY32 = Grid(GridKind.BINARY32)
-BINARY_24, BINARY_53 = 88, 117  # classes of so many binary digits
+BINARY_24, BINARY_53 = 88, 117  # classes of 24 and 53 binary digits
 
 
 def form_of_grid(grid: Grid) -> int:

@@ -33,9 +33,9 @@ def usda(scene: Scene, keys: SceneKeys, generator: str, facts: JsonObject) -> by
     name = identifiers([scene.name])[0]
     body = _markers(scene, keys) if scene.is_markers else _skeleton(scene, keys, name)
     kind = "Xform" if scene.is_markers else "SkelRoot"
-    lines = [*_layer(scene, name, generator, facts), f"def {kind} {quoted(name)} ("]
-    lines.append(f"    displayName = {quoted(scene.name)}")
-    lines += [")", "{", *_indented(_turned_up(scene)), *_indented(body), "}", ""]
+    lines = [*_layer(scene, name, generator, facts), f"def {kind} {quote_text(name)} ("]
+    lines.append(f"    displayName = {quote_text(scene.name)}")
+    lines += [")", "{", *_indented(_to_usd_up(scene)), *_indented(body), "}", ""]
     return "\n".join(lines).encode("utf-8", "replace")
 
 
@@ -43,8 +43,8 @@ def _layer(scene: Scene, name: str, generator: str, facts: JsonObject) -> Iterat
     rate = _number(float(scene.rate))
     yield "#usda 1.0"
     yield "("
-    yield f"    defaultPrim = {quoted(name)}"
-    yield f"    doc = {quoted(generator)}"
+    yield f"    defaultPrim = {quote_text(name)}"
+    yield f"    doc = {quote_text(generator)}"
     yield "    customLayerData = {"
     for key, value in facts.items():
         if isinstance(value, bool):
@@ -55,7 +55,7 @@ def _layer(scene: Scene, name: str, generator: str, facts: JsonObject) -> Iterat
             yield f"        double {key} = {_number(value)}"
         else:
             text = value if isinstance(value, str) else "; ".join(value)
-            yield f"        string {key} = {quoted(text)}"
+            yield f"        string {key} = {quote_text(text)}"
     yield "    }"
     codes = scene.codes if len(scene.codes) else np.zeros(1)
     yield f"    endTimeCode = {_number(codes[-1])}"
@@ -68,7 +68,7 @@ def _layer(scene: Scene, name: str, generator: str, facts: JsonObject) -> Iterat
     yield ""
 
 
-def _turned_up(scene: Scene) -> Iterator[str]:
+def _to_usd_up(scene: Scene) -> Iterator[str]:
     """Turn the up axis to y, unless it is y or z, the only ones of USD."""
     if scene.up_axis in UP_TURNS:
         yield f"float3 xformOp:rotateXYZ = {UP_TURNS[scene.up_axis]}"
@@ -78,8 +78,8 @@ def _turned_up(scene: Scene) -> Iterator[str]:
 def _markers(scene: Scene, keys: SceneKeys) -> Iterator[str]:
     names = identifiers([node.name for node in scene.nodes])
     for name, node, shifts in zip(names, scene.nodes, keys.shifts, strict=True):
-        yield f"def Sphere {quoted(name)} ("
-        yield f"    displayName = {quoted(node.name)}"
+        yield f"def Sphere {quote_text(name)} ("
+        yield f"    displayName = {quote_text(node.name)}"
         yield ")"
         yield "{"
         yield f"    double radius = {_number(MARKER * scene.size)}"
@@ -113,8 +113,8 @@ def _skeleton(scene: Scene, keys: SceneKeys, name: str) -> Iterator[str]:
     yield '    prepend apiSchemas = ["SkelBindingAPI"]'
     yield ")"
     yield "{"
-    yield f"    uniform token[] joints = [{', '.join(map(quoted, paths))}]"
-    names = ", ".join(quoted(node.name) for node in scene.nodes)
+    yield f"    uniform token[] joints = [{', '.join(map(quote_text, paths))}]"
+    names = ", ".join(quote_text(node.name) for node in scene.nodes)
     yield f"    uniform token[] jointNames = [{names}]"
     yield f"    uniform matrix4d[] bindTransforms = [{', '.join(map(_matrix, binds))}]"
     yield f"    uniform matrix4d[] restTransforms = [{', '.join(map(_matrix, rests))}]"
@@ -134,7 +134,7 @@ def _animation(
     turns = [_dense(keys.turns[k], np.array([0.0, 0, 0, 1]), scene.times) for k in moving]
     yield 'def SkelAnimation "animation"'
     yield "{"
-    yield f"    uniform token[] joints = [{', '.join(map(quoted, paths))}]"
+    yield f"    uniform token[] joints = [{', '.join(map(quote_text, paths))}]"
     yield f"    half3[] scales = [{', '.join(['(1, 1, 1)'] * len(moving))}]"
     for label, tracks, order in (
         ("float3[] translations", shifts, [0, 1, 2]),
@@ -219,10 +219,10 @@ def identifiers(names: Sequence[str]) -> list[str]:
     return list(unique)
 
 
-def quoted(text: str) -> str:
+def quote_text(text: str) -> str:
     r"""A text in quotes.
 
-    >>> print(quoted('a "b" \\ \n'))
+    >>> print(quote_text('a "b" \\ \n'))
     "a \"b\" \\ \x0a"
     """
     made = text.replace("\\", "\\\\").replace('"', '\\"')
