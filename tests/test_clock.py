@@ -56,7 +56,7 @@ def test_a_signal_of_times_comes_first() -> None:
 
 
 def test_an_unknown_rate_is_an_error_that_says_what_to_do() -> None:
-    with pytest.raises(mcz.OptionError, match="give the rate"):
+    with pytest.raises(mcz.OptionError, match="set the frame rate"):
         _ = markers(4, None).times
     with pytest.raises(mcz.OptionError, match="rate"):
         mcz.times(markers(4, None))

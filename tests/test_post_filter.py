@@ -102,11 +102,11 @@ def test_each_filter_is_used() -> None:
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
 def test_bad_settings(rate: float) -> None:
-    with pytest.raises(OptionError, match="rows a second"):
+    with pytest.raises(OptionError, match="not a valid rate"):
         taps_of(rate)
     with pytest.raises(OptionError, match="length unit"):
         filter_rows(np.zeros((3, 3)), 120.0, rate)
-    with pytest.raises(MotionError, match="row of shape"):
+    with pytest.raises(MotionError, match="row has shape"):
         PostFilter(3, 120.0, 1.0).push(np.zeros(4))
 
 
@@ -168,11 +168,11 @@ def test_what_cannot_be_filtered() -> None:
         mcz.post_filter(acclaim_walk())
     own = tuple(Channel("", str(c)) for c in range(motion.signals[0].n_channels))
     named = replace(motion.signals[0], channels=own)
-    with pytest.raises(MotionError, match="markers alone"):
+    with pytest.raises(MotionError, match="works on markers"):
         mcz.post_filter(replace(motion, signals=(named, *motion.signals[1:])))
-    with pytest.raises(OptionError, match="frame rate is unknown.*give the rate"):
+    with pytest.raises(OptionError, match="frame rate is unknown.*set the frame rate"):
         mcz.post_filter(replace(motion, frame_rate=None))
-    with pytest.raises(OptionError, match="length unit is unknown.*give the unit"):
+    with pytest.raises(OptionError, match="length unit is unknown.*set the unit"):
         mcz.post_filter(replace(motion, skeleton=replace(motion.skeleton, unit_cm=None)))
     given = mcz.post_filter(replace(motion, frame_rate=None), rate=120)
     assert same(given.values, mcz.post_filter(motion).values)
@@ -192,7 +192,7 @@ def test_parts_are_cut_out_of_the_whole() -> None:
         made = clip.motion((9, 30))
         assert same(made.signals[0].values, rows[9:30])
         assert made.metadata == whole.metadata
-        with pytest.raises(OptionError, match="has frames 0 to"):
+        with pytest.raises(OptionError, match="frames, not 9:"):
             clip.read_masked((9, 10**6))
         with pytest.raises(MotionError, match="no joint"):
             clip.read_masked(None, ["nobody"])

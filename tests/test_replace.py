@@ -416,8 +416,8 @@ REFUSED = {
         OptionError,
         "has no channels",
     ),
-    "frames": ("spine", np.zeros((19, 3)), MotionError, r"\(19, 3\); expected \(20, 3\)"),
-    "channels": ("spine", np.zeros(20), MotionError, r"\(20,\); expected \(20, 3\)"),
+    "frames": ("spine", np.zeros((19, 3)), MotionError, r"\(20, 3\), not \(19, 3\)"),
+    "channels": ("spine", np.zeros(20), MotionError, r"\(20, 3\), not \(20,\)"),
     "text": ("knee", ["a"] * 20, MotionError, "not numbers"),
 }
 

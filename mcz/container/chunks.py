@@ -304,9 +304,9 @@ def parse_packet_head(data: bytes | bytearray, at: int, limit: int) -> tuple[int
     """
     first = data[at]
     if first & 0x70:  # PACK-08
-        raise FormatError(f"a packet with reserved bits, kind {first:#04x}")
+        raise FormatError(f"packet kind {first:#04x} has reserved bits set")
     if first & KIND > FRAME:  # PACK-09
-        raise FormatError(f"a packet of kind {first & KIND}")
+        raise FormatError(f"packet kind {first & KIND} is unknown")
     try:
         sequence, here = read_varint(data, at + 1)
         length, here = read_varint(data, here)

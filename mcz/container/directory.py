@@ -201,11 +201,11 @@ class SignalRow:
         """The row of a signal of CLIP; raises FormatError."""
         cut = signal.skip, signal.spare
         if clip.flags & payloads.OPEN_CLIP and any(cut):  # CLIP-19
-            raise FormatError(
-                f"n_frames is open, but a signal has skip and spare {cut}", where=where
-            )
+            raise FormatError(f"skip and spare are {cut}, but n_frames is open", where=where)
         if sum(cut) + clip.n_frames > MAX_COUNT:  # CLIP-20
-            raise FormatError(f"skip and spare {cut} of {clip.n_frames} frames", where=where)
+            raise FormatError(
+                f"skip and spare {cut} exceed the {clip.n_frames} frames", where=where
+            )
         n_channels = sum(run.n_channels for run in signal.grids)
         codec = signal.codec, signal.preset, signal.codec_version
         return cls(n_channels, signal.samples_per_frame, *cut, *codec)

@@ -119,9 +119,9 @@ class Connections:
         except ValueError as error:
             raise self.error(str(error)) from None
         if parts.scheme not in ("http", "https") or not parts.hostname:
-            raise self.error(f"{address} is not an address of http or https")
+            raise self.error(f"{address} is not an http or https URL")
         if "@" in parts.netloc:
-            raise self.error("an address with a user and a password is not taken")
+            raise self.error("a URL with user and password is not accepted")
         query = f"?{parts.query}" if parts.query else ""
         path = quote((parts.path or "/") + query, safe=PLAIN)
         return _Goal(parts.scheme, parts.hostname, port, path)
@@ -145,7 +145,7 @@ class Connections:
     def _redirect(self, goal: _Goal, place: str) -> _Goal:
         led = self._parse_address(urljoin(goal.address, place))
         if goal.scheme == "https" and led.scheme == "http":
-            raise self.error("the server leads from https to http, which is not followed")
+            raise self.error("the server redirects from https to http, which is refused")
         return led
 
     def _send(self, goal: _Goal, headers: dict[str, str], most: int) -> Answer:
@@ -217,7 +217,7 @@ def _exchange(line: _Line, goal: _Goal, headers: dict[str, str], most: int) -> t
 def _describe(error: Exception) -> str:
     if isinstance(error, http.client.IncompleteRead):
         came = len(error.partial)
-        return f"{came + (error.expected or 0)} bytes are announced, {came} came"
+        return f"{came + (error.expected or 0)} bytes were announced, but {came} received"
     if isinstance(error, TimeoutError):
         return f"no answer within {TIMEOUT:.0f} s"
     return reason_of(error)

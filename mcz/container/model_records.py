@@ -179,14 +179,14 @@ def whole_time_base(fields: payloads.Clip, cend: payloads.Cend | None) -> payloa
     is_open = bool(fields.flags & payloads.OPEN_CLIP)
     late = cend.missing if cend is not None else []
     if is_open and base is not None and base.missing:  # TIME-04
-        raise FormatError("it is open, but states missing frames", clip=fields.name)
+        raise FormatError("the clip is open, but states missing frames", clip=fields.name)
     timed = any(signal.role == payloads.TIMES for signal in fields.signals)
     if timed and base is not None and base.first_time is not None:  # TIME-07
         raise FormatError(
-            "the time of its first frame, and a signal of times too", clip=fields.name
+            "both the time of the first frame and a signal of times are given", clip=fields.name
         )
     if late and not is_open:  # TIME-05
-        raise FormatError("its CEND states missing frames, but it is not open", clip=fields.name)
+        raise FormatError("CEND states missing frames, but the clip is not open", clip=fields.name)
     if not late:
         return base
     first_time = None if base is None else base.first_time
@@ -211,7 +211,7 @@ def numbers_of(base: payloads.TimeBase | None, n_frames: int, name: str, *, whol
         elif whole:  # TIME-02
             raise FormatError(f"frames are missing after frame {n_frames - 1}", clip=name)
     if whole and last > MAX_NUMBER:  # TIME-03
-        raise FormatError(f"its last frame has the number {last}", clip=name)
+        raise FormatError(f"the number of the last frame, {last}, is too large", clip=name)
     return np.cumsum(steps)
 
 
@@ -225,7 +225,7 @@ class MissingRunCounter:
     def miss(self, count: int) -> None:
         """Skip so many frames after the last one; raises OptionError before the first."""
         if count < 1 or not (self._frames or self.runs):
-            raise OptionError(f"{count} frames cannot be missing here")
+            raise OptionError(f"{count} frames cannot be marked as missing here")
         if self._last + self._gap + count >= MAX_NUMBER:
             raise OptionError("a frame number is beyond 2^52 - 1")
         self._gap += count
@@ -259,7 +259,7 @@ def parse_clip(payload: bytes, head: bytes, where: str, *, shared: bool = False)
     """
     needed, stated = tuple(payload[:2]), tuple(head[2:4])
     if stated and needed > stated:  # CLIP-22
-        raise FormatError(f"it needs format {needed}, HEAD states {stated}", where=where)
+        raise FormatError(f"the file needs format {needed}, but HEAD states {stated}", where=where)
     if shared:
         return parse_shared(payloads.Clip, payload, where, "signals")
     return parse(payloads.Clip, payload, where)

@@ -412,7 +412,9 @@ class Parser:
                 self._number = header.stop
             self._is_told = was_told or header.signal == 0
             if packet.fresh != bool(header.flags & FRESH):  # PACK-11
-                raise FormatError(f"packet at {event.body}: its segment differs in starting fresh")
+                raise FormatError(
+                    f"packet at {event.body}: packet and segment disagree whether it starts fresh"
+                )
             event.segment = header
         elif packet.kind == END_KIND and packet.body:  # PACK-05, PACK-07
             raise FormatError(f"the end packet must be empty, but has {len(packet.body)} bytes")

@@ -351,16 +351,20 @@ def parse_group_notes(data: bytes, n_rows: int, grids: Sequence[Grid], name: str
     channels = [channel for channel, _ in changes]
     # NOTES-02, NOTES-03
     if channels != sorted(set(channels)) or any(c >= n_channels for c in channels):
-        raise FormatError(f"grid changes of channels {channels}", where=where)
+        raise FormatError(f"grid changes of nonexistent channels {channels}", where=where)
     current = dict(enumerate(grids)) | dict(changes)  # NOTES-08
     row, last, exceptions = 0, (-1, -1), []
     for e in fields.exceptions:
         row += e.row
         # NOTES-03, NOTES-04, NOTES-05
         if row >= n_rows or e.channel >= n_channels or (row, e.channel) <= last:
-            raise FormatError(f"exception at row {row}, channel {e.channel}", where=where)
+            raise FormatError(
+                f"exception outside the segment: row {row}, channel {e.channel}", where=where
+            )
         if not current[e.channel].is_text:  # NOTES-08
-            raise FormatError(f"exception on {current[e.channel]}, which has no text", where=where)
+            raise FormatError(
+                f"an exception needs a text grid, but the grid is {current[e.channel]}", where=where
+            )
         last = row, e.channel
         exceptions.append((row, e.channel, bytes(e.text)))
     return changes, exceptions

@@ -36,7 +36,7 @@ def is_plain_path(name: str) -> bool:
 
 def check_path(name: str, where: str) -> None:
     if not is_plain_path(name):
-        raise FormatError(f"path {name!r} is not relative and plain", where=where)
+        raise FormatError(f"path {name!r} is not a plain relative path", where=where)
 
 
 def check_skeleton(
@@ -64,7 +64,7 @@ def _check_source(
     _refer(directory, ChunkType.SRCE, id_, where)  # GRAM-03
     if templates.get(id_, source.format) != source.format:  # CLIP-03, SKEL-04
         raise FormatError(
-            f"source format {source.format}, its SRCE has {templates[id_]}", where=where
+            f"source format is {source.format}, but its SRCE has {templates[id_]}", where=where
         )
     if source.format in others:  # CLIP-04, SKEL-03
         raise FormatError(
@@ -89,15 +89,16 @@ def check_clip(
 
 def _refer(directory: Directory, kind: bytes, id_: bytes, where: str) -> None:
     if (kind, bytes(id_)) not in directory.shared:
-        raise FormatError(
-            f"no {kind.decode()} before it has the id {bytes(id_).hex()}", where=where
-        )
+        raise FormatError(f"no earlier {kind.decode()} has the id {bytes(id_).hex()}", where=where)
 
 
 def check_target(fields: payloads.Alia, where: str, sourced: Collection[tuple[int, bytes]]) -> None:
     """Check that the target of an alias precedes it, and can be restored."""
     if (fields.of, bytes(fields.target)) not in sourced:  # GRAM-04
-        raise FormatError(f"chunk {where}: nothing before it with a source is {fields.target!r}")
+        raise FormatError(
+            f"chunk {where}: its target {fields.target!r} is no earlier clip or skeleton with "
+            "a source"
+        )
 
 
 def check_ancillary(
@@ -117,7 +118,7 @@ def check_ancillary(
         parse(payloads.Qual, payload, chunk.label)  # QUAL-02
     elif chunk.type == ChunkType.META:
         if not directory.clips:  # META-01
-            raise FormatError(f"chunk {chunk.label} lies before the first clip")
+            raise FormatError(f"chunk {chunk.label} precedes the first clip")
         parse_meta(payload, chunk, file_bytes)
     elif chunk.type == ChunkType.COPY:
         copies = parse_copies(payload, chunk, file_bytes)
@@ -142,9 +143,9 @@ def check_plain(kind: bytes, payload: bytes, where: str) -> None:
     else:
         packed = kind == ChunkType.SKEL and is_packed(payload, where)
     if packed:  # LIMIT-22
-        raise LimitError("the profile small packs nothing", where=where)
+        raise LimitError("profile small does not allow packed contents", where=where)
     if kind in ABSENT:  # LIMIT-23
-        raise LimitError("the profile small does not allow this chunk", where=where)
+        raise LimitError("profile small does not allow this chunk", where=where)
     if kind == ChunkType.CLIP:
         _check_clip(parse(payloads.Clip, payload, where), where)
 
@@ -152,6 +153,9 @@ def check_plain(kind: bytes, payload: bytes, where: str) -> None:
 def _check_clip(fields: payloads.Clip, where: str) -> None:
     for signal in fields.signals:
         if signal.codec not in CODECS:  # LIMIT-20
-            raise LimitError(f"codec {signal.codec}: small has raw and fast", where=where)
+            raise LimitError(
+                f"profile small allows only codecs raw and fast, not codec {signal.codec}",
+                where=where,
+            )
         if any(run.grid.kind == GridKind.PRINTED for run in signal.grids):  # LIMIT-21
-            raise LimitError("grid PRINTED: the profile small does not have it", where=where)
+            raise LimitError("profile small does not allow grid PRINTED", where=where)

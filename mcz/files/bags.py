@@ -287,7 +287,7 @@ def bag(
     target, paths = Path(folder), [Path(file) for file in files]
     lines = _info_lines(dict(info or {}), software)
     if os.path.lexists(target):
-        raise ExistsError("it exists; a bag is a new folder", path=target)
+        raise ExistsError("already exists; a bag must be a new folder", path=target)
     _check_files(paths)
     try:
         temporary = Path(
@@ -301,7 +301,7 @@ def bag(
         os.umask(umask)
         temporary.chmod(0o777 & ~umask)  # mkdtemp made it private
         if os.path.lexists(target):
-            raise ExistsError("it exists; a bag is a new folder", path=target)
+            raise ExistsError("already exists; a bag must be a new folder", path=target)
         temporary.rename(target)
     except BaseException as error:
         with suppress(OSError):
@@ -314,7 +314,7 @@ def bag(
 
 def _info_lines(info: dict[str, str], software: str) -> list[tuple[str, str]]:
     if any(name.lower() == OXUM.lower() for name in info):
-        raise OptionError(f"{OXUM} is counted, it cannot be given")
+        raise OptionError(f"{OXUM} is computed, so it cannot be set")
     given = {name.lower() for name in info}
     ours = {"Bagging-Date": date.today().isoformat(), "Bag-Software-Agent": software}
     lines = [*info.items(), *(pair for pair in ours.items() if pair[0].lower() not in given)]
@@ -324,14 +324,17 @@ def _info_lines(info: dict[str, str], software: str) -> list[tuple[str, str]]:
 
 def _check_files(paths: Sequence[Path]) -> None:
     if not paths:
-        raise OptionError("a bag of no files")
+        raise OptionError("a bag needs at least one file")
     names: dict[str, Path] = {}
     for path in paths:
         other = names.setdefault(path.name.casefold(), path)
         if other is not path:
-            raise OptionError(f"{other} and {path} would have one name in the bag")
+            raise OptionError(f"{other} and {path} would have the same name in the bag")
         if set(path.name) & set("%\r\n"):  # RFC 8493 escapes them, but some tools do not
-            raise OptionError("tools for bags differ on names with %; rename it", path=path)
+            raise OptionError(
+                "the name contains %, which tools for bags treat differently; rename the file",
+                path=path,
+            )
         if not path.is_file():
             raise AccessError(f"{'not a file' if path.exists() else 'no such file'}", path=path)
     for path in paths:
@@ -341,7 +344,7 @@ def _check_files(paths: Sequence[Path]) -> None:
         if problems:
             more = f" and {len(problems) - 1} more" if len(problems) > 1 else ""
             text = f"{counted(len(problems), 'fault')}: {problems[0].message}{more}"
-            raise FormatError(f"damaged, so not put into a bag; {text}", path=path)
+            raise FormatError(f"damaged, so it was not added to the bag; {text}", path=path)
 
 
 def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> None:
@@ -355,7 +358,7 @@ def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> 
         _sync(copy)
         size += copy.stat().st_size
         if _add_digests(by_algorithm, f"{PAYLOAD}/{path.name}", copy) != digests(path):
-            raise AccessError("it changed while it was copied", path=path)
+            raise AccessError("the file changed while it was copied", path=path)
     tags = {
         DECLARATION: "BagIt-Version: 1.0\nTag-File-Character-Encoding: UTF-8\n",
         INFO: tags_text([*lines, (OXUM, f"{size}.{len(paths)}")]),

@@ -80,7 +80,9 @@ def map_clips(
     """
     with open(target, max_decoded=max_decoded) as file, connect(client) as used:
         if not can_be_shared(file):
-            raise OptionError("no file that the machines of a cluster can open", path=file.name)
+            raise OptionError(
+                "the machines of a cluster can open none of these files", path=file.name
+            )
         names = [clip.name for clip in file.chosen(where=where)]
         with use_engine(Cluster(used)), share_clips(_mapped, file, names, function) as answers:
             return [answer() for answer in answers]
@@ -331,7 +333,7 @@ def list_files(root: str, target: Target) -> tuple[list[Entry], list[Outcome]]:
         if entry["type"] == "file" and path != own and not path.endswith("/")
     ]
     if not files:
-        raise OptionError("no file is below it", path=root)
+        raise OptionError("the folder contains no file", path=root)
     return sorted(files, key=lambda one: os.fsencode(one.name)), []
 
 

@@ -62,7 +62,7 @@ def limit_jobs(jobs: int | None) -> Iterator[None]:
     Raises OptionError for a number below 1.
     """
     if jobs is not None and jobs < 1:
-        raise OptionError(f"jobs: {jobs}, not at least 1")
+        raise OptionError(f"jobs is {jobs}; it must be at least 1")
     token = _LIMIT.set(jobs or _LIMIT.get())
     try:
         yield

@@ -131,7 +131,7 @@ def to_npz(table: Table) -> bytes:
     """
     rate = table.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) >= 2**63:
-        raise MotionError(f"a frame rate of {float(rate):g}: an NPZ has terms below 2^63")
+        raise MotionError(f"an NPZ cannot hold frame rate {float(rate):g}: a term exceeds 2^63")
     more: Settings = {"units": np.array(table.units, np.str_)} if table.units else {}
     more |= {} if table.times is None else {"times": table.times}
     if table.motion is not None:
@@ -275,7 +275,7 @@ def to_xarray(
     channels. Raises OptionError.
     """
     if form not in COMPONENTS:
-        raise OptionError(f"rotations as {form!r}: one of {', '.join(COMPONENTS)}")
+        raise OptionError(f"unknown rotations {form!r}; known are {', '.join(COMPONENTS)}")
     xarray = import_extra("xarray", "xarray")
     skeleton, main = motion.skeleton, motion.signals[0]
     numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
@@ -390,7 +390,7 @@ def to_pandas(
         names = tuple(channel_names(motion.skeleton, signal.channels))
         return _table(pandas, motion, signal, signal.masked(), names)
     known = [*PLACES, *COMPONENTS, "channels", *signals]
-    raise OptionError(f"a table of {what!r}: one of {', '.join(known)}")
+    raise OptionError(f"unknown table {what!r}; it must be one of {', '.join(known)}")
 
 
 def _names(motion: Motion, joints: Joints) -> tuple[str, ...]:

@@ -226,7 +226,7 @@ def test_bvh_arrives_as_it_is_read() -> None:
         (HEADER.replace(b"Frames: 3\n", b""), "'Frames:' must follow MOTION"),
         (
             b"HIERARCHY\nROOT a\n{\n}\nMOTION\nFrames: 1\nFrame Time: 1\n",
-            "signal no joint is not made of joints",
+            "no joint has channels",
         ),
     ],
 )
@@ -242,7 +242,7 @@ def test_bad_bvh(data: bytes, match: str) -> None:
         (b"1\nroot 1 2 3 4 5 6\nknee 1\nknee 2\n", "twice"),
         (b"1\nroot 1 2 3 4 5 6\nknee 1\ntoe 2\n", "is not in the first frame"),
         (b"1\nroot 1 2 3 4 5 6\nknee 1\n2\nknee 1 2\n", "2 values for bone"),
-        (b"1\nroot 1 2 3 4 5 x\nknee 1\n", "write a number and optionally a unit, such as 0.5mV"),
+        (b"1\nroot 1 2 3 4 5 x\nknee 1\n", "not a number"),
         (b"12345678901234567\n", "too large"),
     ],
 )

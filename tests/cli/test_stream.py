@@ -151,7 +151,7 @@ def test_rows_of_the_channels_of_a_skeleton(tmp_path: Path) -> None:
     code, _, errors = run("encode", *CODER, "--skeleton", tmp_path / "no.bvh", data=data)
     assert (code, "no such file" in errors) == (1, True)
     code, _, errors = run("encode", *CODER, "--skeleton", __file__, data=data)
-    assert (code, "a skeleton is in" in errors) == (2, True)
+    assert (code, "give the skeleton as" in errors) == (2, True)
 
 
 def test_parameters_change_by_a_line(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def test_trees(which: str, n_joints: int, name: str, parent: str) -> None:
 
 def test_what_is_no_tree() -> None:
     for which in ("star", 23):
-        with pytest.raises(OptionError, match=r"there are smpl \(24 joints\), smplh"):
+        with pytest.raises(OptionError, match=r"the body trees are smpl \(24 joints\), smplh"):
             tree(which)
 
 

@@ -187,13 +187,13 @@ def test_rotations_are_a_signal(processor: int) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda d: b"", "offset 0: the file ends"),
-        (lambda d: d[:511], "offset 511: the file ends"),
+        (lambda d: b"", "offset 0: the file is truncated"),
+        (lambda d: d[:511], "offset 511: the file is truncated"),
         (lambda d: d[:1] + b"\0" + d[2:], "offset 1: 0x00 is not"),
-        (lambda d: b"\0" + d[1:], "offset 0: block 0"),
-        (lambda d: b"\xff" + d[1:], "offset 0: block 255"),
+        (lambda d: b"\0" + d[1:], "offset 0: the parameters begin at block 0"),
+        (lambda d: b"\xff" + d[1:], "offset 0: the parameters begin at block 255"),
         (lambda d: d[:515] + b"\0" + d[516:], "offset 515: processor 0"),
-        (lambda d: d[:16] + b"\xff\xff" + d[18:], "offset 16: block 65535"),
+        (lambda d: d[:16] + b"\xff\xff" + d[18:], "offset 16: the data begin at block 65535"),
         (lambda d: d[:2] + b"\xff\x7f" + d[4:600], "offset 1024"),
     ],
 )
@@ -305,7 +305,7 @@ def test_other_signals_and_values_too_large_are_refused() -> None:
         c3d.write(markers(1, np.zeros((1, 3)), signals=(Signal(np.zeros((1, 3))), other)))
     with pytest.raises(MotionError, match="too large"):
         c3d.write(markers(1, np.full((1, 3), 1e300)))
-    with pytest.raises(MotionError, match="too much"):
+    with pytest.raises(MotionError, match="too long"):
         c3d.write(
             Motion(
                 Skeleton(tuple(Joint("n" * 200, channels=POSITION) for _ in range(900))),

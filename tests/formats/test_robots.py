@@ -93,11 +93,11 @@ def test_an_unlike_quaternion_is_not_recognized(tmp_path: Path) -> None:
 
 def test_a_layout_of_another_number_of_columns_is_refused(tmp_path: Path) -> None:
     path = table(tmp_path / "walk.csv", 29)
-    with pytest.raises(mcz.MotionError, match="unitree-h1 are 19 columns, or 26 with the root"):
+    with pytest.raises(mcz.MotionError, match="unitree-h1 has 19 columns, or 26 with the root"):
         mcz.read(path, arrays="unitree-h1")
     named = (tmp_path / "named.csv").write_text("a,b\n1.5,2.5\n1.5,2.5\n")
     assert named
-    with pytest.raises(mcz.MotionError, match="there are 2"):
+    with pytest.raises(mcz.MotionError, match="the array has 2"):
         mcz.read(tmp_path / "named.csv", arrays="unitree-h1")
 
 

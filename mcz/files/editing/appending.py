@@ -311,4 +311,6 @@ def _settle(directory: Directory, start: int, end: int, redundancy: float) -> tu
         if len(tail) == t_size:
             return shape, tail
         t_size = len(tail)
-    raise OptionError(f"redundancy {redundancy:g}: no index fits; another one may do")
+    raise OptionError(
+        f"redundancy {redundancy:g} leads to no valid layout; try a slightly different value"
+    )

@@ -150,7 +150,7 @@ class Folder:
         if os.name == "nt":
             for part in parts:
                 if fault := fault_of(part):
-                    raise AccessError(f"this system cannot hold the name {part!r}: {fault}")
+                    raise AccessError(f"this system does not allow the name {part!r}: {fault}")
         self._root.mkdir(parents=True, exist_ok=True)
         place = self._root
         for part in parts[:-1]:
@@ -159,20 +159,20 @@ class Folder:
             if status is None:
                 place.mkdir(exist_ok=True)
             elif not stat.S_ISDIR(status.st_mode) or _is_junction(place):
-                raise AccessError(f"it is {_kind(status)}, where a folder is needed", path=place)
+                raise AccessError(f"it is {_kind(status)}, but a folder is needed", path=place)
         place = place / parts[-1]
         status = _lstat(place)
         if status is None:
             return place
         if not stat.S_ISREG(status.st_mode):
-            raise AccessError(f"it is {_kind(status)}, which is not written to", path=place)
+            raise AccessError(f"it is {_kind(status)}; refusing to write to it", path=place)
         if (other := self._written.get((status.st_dev, status.st_ino))) is not None:
             raise ExistsError(
-                f"this disk takes it for the same name as {other!r}, which was just written",
+                f"this disk treats the name like {other!r}, which was just written",
                 hint=Hint.PORTABLE_NAMES,
             )
         if not force:
-            raise ExistsError("it exists", path=place, hint=Hint.FORCE)
+            raise ExistsError("already exists", path=place, hint=Hint.FORCE)
         return place
 
     def write(self, path: str, data: bytes, source: Target, *, force: bool, name: str = "") -> Path:

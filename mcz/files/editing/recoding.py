@@ -160,9 +160,7 @@ def _check_values(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDAr
     if given.ndim == 1 and shape[1] == 1:
         given = given[:, None]
     if given.shape != shape:
-        raise MotionError(
-            f"the new values have shape {given.shape}; expected {shape}", clip=clip.name
-        )
+        raise MotionError(f"expected values of {shape}, not {given.shape}", clip=clip.name)
     return given
 
 
@@ -188,9 +186,7 @@ def _edit_signal(
         given = np.where(valid, given, 0.0)
         whole = np.rint(given)
         if (np.abs(whole) > MAX_INTEGER).any() or (not on_grid and (whole != given).any()):
-            raise MotionError(
-                "this clip holds only integers up to 2^53; a new value is none", clip=clip.name
-            )
+            raise MotionError("the clip holds only integers up to 2^53", clip=clip.name)
         given = whole
     new[:, columns] = np.where(valid, given, new[:, columns])
     mask[:, columns] = valid
@@ -325,9 +321,7 @@ def _decode_recoded(
         ordinals = source.ordinals(span.first, span.stop)[:, columns]
         ordinals = ordinals[(a - span.first) * per_frame : (b - span.first) * per_frame]
         if (decoded[(a - start) * per_frame : (b - start) * per_frame] != ordinals).any():
-            raise AssertionError(
-                f"codec {info.codec.name}: the decoded joint differs from the new values"
-            )
+            raise AssertionError(f"codec {info.codec.name}: the decoded joint differs")
     return signal if signal.values.dtype == np.int64 else settle(signal)[1]
 
 
@@ -339,11 +333,13 @@ def check_anew(clip: Clip, *, whole: bool = False) -> None:
     info = clip.signals[0]
     if info.exact and not (whole and "param.lossless" in (clip.quality or {})):
         raise OptionError(
-            "some of its joints are coded exactly, and would not be any more", clip=clip.name
+            "some joints are exact, and re-encoding would not keep them exact", clip=clip.name
         )
     if not info.codec.lossless and (clip.quality or {}).get("codec") != info.codec.name:
         raise OptionError(
-            "no quality record states its settings; decode it and encode it again", clip=clip.name
+            "its settings are unknown, because there is no quality record; decode it and "
+            "encode it again",
+            clip=clip.name,
         )
 
 

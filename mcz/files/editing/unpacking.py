@@ -75,7 +75,7 @@ def _clip_sources(container: Container) -> Iterator[tuple[str, str, bytes]]:
 def _check_chunk(chunk: bytes) -> bytes:
     """The payload of a whole chunk; raises FormatError for a wrong crc."""
     if CRC.pack(zlib.crc32(memoryview(chunk)[: -CRC.size])) != chunk[-CRC.size :]:
-        raise FormatError("a damaged chunk")
+        raise FormatError("a chunk is damaged")
     return chunk[HEADER.size : -CRC.size]
 
 

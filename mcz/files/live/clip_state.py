@@ -113,7 +113,7 @@ class Concealer:
             return
         self.is_whole = False
         if self._lost == "refuse":
-            raise LostFrameError(f"frame {self.due - self._first} did not come")
+            raise LostFrameError(f"frame {self.due - self._first} did not arrive")
         if not self._spend(count):  # LIVE-12
             yield from self.end()
             self.due = number

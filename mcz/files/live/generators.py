@@ -63,7 +63,7 @@ def live_frames(stream: BinaryIO) -> Iterator[Frame]:
     of a clip differ from its hash. ``stream_decode`` can continue instead.
     """
     if not hasattr(stream, "read"):
-        raise OptionError(f"cannot read from {stream!r}: not a binary stream")
+        raise OptionError(f"cannot read from {stream!r}, which is not a binary stream")
     frames = StrictFrames(stream, StreamSummary()).frames()
     return ((frame.number, frame.values, frame.valid) for frame in frames)
 
@@ -123,7 +123,7 @@ class StrictFrames:
         frame = row.header.first
         fresh = bool(row.header.flags & FRESH)
         if not (frame or fresh):
-            raise FormatError("the first segment needs one before it", clip=clip.clip.name)
+            raise FormatError("the first segment depends on an earlier one", clip=clip.clip.name)
         values = clip.decoder.push(stream, fresh)
         if clip.shown is not None:
             if frame not in clip.shown:

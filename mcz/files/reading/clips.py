@@ -57,7 +57,7 @@ def filter_clips(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> I
     if isinstance(where, Query):
         where = _matcher(where, of)
     elif not callable(where):
-        raise OptionError(f"where is {where!r}, neither a text nor a function of a clip")
+        raise OptionError(f"where is {where!r}; it must be a string or a function of a clip")
     return filter(where, clips)
 
 
@@ -86,7 +86,7 @@ def getter_of(name: str, clips: Collection[Clip]) -> Getter:
     if getter is None:
         known_names = among(sorted(_known_names(name, clips)), name)
         raise OptionError(
-            f"{name!r} is neither a field nor a metadata key; known are {known_names}"
+            f"{name!r} is neither a field nor a metadata key; the fields and keys are {known_names}"
         )
     return getter
 

@@ -143,8 +143,8 @@ def _check_markers(name: str, skeleton: Skeleton, has_channels: bool) -> None:
     """Raise MotionError for a motion of other joints than markers, or with channels of its own."""
     if has_channels or point_set(skeleton) != "markers":
         raise MotionError(
-            f"motion {name!r} is not one of markers alone, and the post filter is for positions; "
-            "mcz.in_positions makes them of a skeleton's motion"
+            f"the post filter works on markers, and motion {name!r} has joints; convert it "
+            "with mcz.in_positions"
         )
 
 
@@ -154,13 +154,14 @@ def _settings(
     """Rows a second, and the length unit in cm; raises OptionError where either is unknown."""
     if rate is None:  # FILT-03
         raise OptionError(
-            "its frame rate is unknown, and the post filter's cutoffs are in Hz",
+            "its frame rate is unknown, but the post filter needs it: its cutoffs are in Hz",
             clip=name,
             hint=Hint.RATE,
         )
     if skeleton.unit_cm is None:  # FILT-03
         raise OptionError(
-            "its length unit is unknown, and the post filter's thresholds are 20 and 120 mm",
+            "its length unit is unknown, but the post filter needs it: its thresholds are 20 "
+            "and 120 mm",
             clip=name,
             hint=Hint.UNIT,
         )

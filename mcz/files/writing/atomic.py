@@ -341,7 +341,7 @@ class WriteTransaction:
         there = self.paths[path]
         if (there if isinstance(there, bytes) else there()) == digest:
             return True
-        raise SourceError(f"the file already restores another {path!r}", hint=Hint.REPLACE)
+        raise SourceError(f"the archive already has a source file {path!r}", hint=Hint.REPLACE)
 
     def finish(self) -> None:
         self.writer.finish()
@@ -368,10 +368,10 @@ def check_name(path: str) -> None:
         path.encode("utf-8")
     except UnicodeEncodeError:
         raise MotionError(
-            f"the name {os.fsencode(path)!r} is not UTF-8, as MCZ keeps names; rename the file"
+            f"the name {os.fsencode(path)!r} is not valid UTF-8; rename the file"
         ) from None
     if not is_plain_path(path):
-        raise MotionError(f"source path {path!r} is not relative and plain; rename the file")
+        raise MotionError(f"source path {path!r} is not a plain relative path; rename the file")
 
 
 def check_metadata(metadata: Mapping[str, str], name: str) -> None:

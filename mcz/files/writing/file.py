@@ -198,7 +198,7 @@ def _refuse_early(source_format: Format, data: bytes, profile: Profile) -> None:
     """Raise LimitError for more joints than the profile has, before any of them is read."""
     if source_format.has_more_joints and source_format.has_more_joints(data, profile.joints):
         raise LimitError(
-            f"joints: there are more than the limit of {profile.joints}",
+            f"there are more joints than the limit of {profile.joints}",
             hint=Hint.LARGE if profile is not LARGE else None,
         )
 

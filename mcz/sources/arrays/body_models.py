@@ -280,7 +280,7 @@ def with_model(motion: Motion, model: str | os.PathLike[str]) -> Motion:
         gender = motion.metadata.get("x-gender", "")
         if not gender.isalnum():
             raise OptionError(
-                f"the take states the gender {gender!r}, which no model file is named after",
+                f"{GENDER} needs the gender of the take, which is {gender!r}",
                 path=path,
             )
         path = path.replace(GENDER, gender)
