@@ -19,8 +19,8 @@ const NOTHING = new Uint8Array(0);
  * @property {number} firstFrame stored frame
  * @property {number} nFrames
  * @property {number} nRows
- * @property {number} lead frames before firstFrame that it bears upon
- * @property {number} tail frames behind its last that it bears upon
+ * @property {number} lead frames before firstFrame that it affects
+ * @property {number} tail frames behind its last that it affects
  * @property {number} flags as in DATA
  * @property {boolean} fresh needs no segment before it
  * @property {Uint8Array} payload of DATA or of its packet

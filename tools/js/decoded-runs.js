@@ -16,7 +16,7 @@ const MOST_HELD = 192 * 1024 * 1024; // of all runs of a file
  *
  * @param {import("./clip.js").Signal} signal
  * @param {boolean} alone each segment is decoded by itself
- * @returns {Run[] | null} null where segments bear upon frames that are not their own
+ * @returns {Run[] | null} null where segments affect frames that are not their own
  */
 export function runsOf({ segments }, alone) {
   const runs = [];

@@ -27,7 +27,7 @@ export function chainsOf(segments, stored) {
     chain.segments.push(segment);
     chain.to += segment.nFrames;
   }
-  // What a lost neighbor bears upon is lost with it; it reaches no farther than others do.
+  // What a lost neighbor affects is lost with it; it reaches no farther than others do.
   const lead = segments.reduce((most, segment) => Math.max(most, segment.lead), 0);
   const tail = segments.reduce((most, segment) => Math.max(most, segment.tail), 0);
   let end = 0; // of the chain before

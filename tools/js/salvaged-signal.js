@@ -55,7 +55,7 @@ async function halve(segments, from, to, skip, rescue) {
       const inner = starts.filter((start) => start > a && start < b);
       const middle = inner[inner.length >> 1];
       if (inner.length > 0) todo.push([middle, b], [a, middle]);
-      // Of one segment, the frames that the one after bears upon may be lost with that.
+      // Of one segment, the frames that the one after affects may be lost with that.
       else if (lead > 0 && b === end && end - lead > a) todo.push([a, end - lead]);
     }
   }

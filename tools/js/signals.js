@@ -179,7 +179,7 @@ function signalLayout(clip, signal) {
 }
 
 /**
- * The segments that bear upon some stored frames, as one run, and those before it back to one that
+ * The segments that affect some stored frames, as one run, and those before it back to one that
  * starts fresh. Where each segment stands alone, those that have the frames.
  */
 function neededSegments(segments, { from, to }, alone) {

@@ -116,7 +116,7 @@ export class Walk {
     this.endOfFoot = foot.end;
   }
 
-  /** QUAL, META, REPT, COPY, unknown types: nothing that they say bears upon what is decoded. */
+  /** QUAL, META, REPT, COPY, unknown types: nothing that they say affects what is decoded. */
   readAncillary(chunk) {
     const { type, offset, payload } = chunk;
     if (type === "COPY") checkCopies(chunk, this.copied, this.file.size);

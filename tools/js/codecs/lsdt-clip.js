@@ -47,7 +47,7 @@ export function checkLayout(codec, { groups, nResolutions, samplesPerFrame }) {
   if (samplesPerFrame !== 1) throw new Refused(`${codec}: ${samplesPerFrame} rows a frame`);
 }
 
-/** Refuses a segment of the lsdt-frame, lsdt-clip and online that bears upon frames of others. */
+/** Refuses a segment of the lsdt-frame, lsdt-clip and online that affects frames of others. */
 export function checkReach(codec, { firstFrame, lead, tail }) {
   if (lead !== 0 || tail !== 0) {
     throw new Refused(`${codec}: the segment of frame ${firstFrame} has a lead or tail`);
