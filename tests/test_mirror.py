@@ -153,7 +153,7 @@ def test_names_say_the_side(left: str, right: str) -> None:
     if plain:
         assert pairs_of("root", left) == ["root", left]
     else:
-        with pytest.raises(OptionError, match=f"there is no joint '{right}'; pairs= names"):
+        with pytest.raises(OptionError, match=f"there is no joint '{right}'; name its counterpart"):
             pairs_of("root", left)
 
 

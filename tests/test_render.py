@@ -268,7 +268,7 @@ def test_any_numbers_are_drawn_or_refused(tmp_path_factory: Any, motion: Motion)
 
 def broken() -> Iterator[tuple[Motion, str]]:
     motion = smooth(8)
-    yield smooth(0), "no frame"
+    yield smooth(0), "none of these frames"
     yield motion.with_values(np.full((8, 10), np.nan)), "no position is known"
     yield motion.with_values(np.full((8, 10), 1e300)), "no position is known"
     yield Motion(Skeleton(()), (Signal(np.zeros((5, 0))),)), "no joint"
@@ -304,12 +304,12 @@ def test_a_frame_far_away_spoils_nothing(tmp_path: Path) -> None:
         ("a.png", {"size": (10, 500)}, "64 to 4096"),
         ("a.png", {"sheet": 0}, "1 to 400"),
         ("a.png", {"sheet": 400, "size": (300, 300)}, "too small"),
-        ("a.gif", {"sheet": 3}, "no film"),
+        ("a.gif", {"sheet": 3}, "not a film"),
         ("a.gif", {"fps": 0}, "it must be above 0 and at most"),
         ("a.gif", {"speed": float("nan")}, "above 0"),
-        ("a.gif", {"speed": 1e-12}, "below 1,000,000"),
-        ("a.png", {"frames": (5, 99)}, "0 to 8"),
-        ("a.png", {"unit": "mile"}, "not one of"),
+        ("a.gif", {"speed": 1e-12}, "the limit is 1,000,000"),
+        ("a.png", {"frames": (5, 99)}, "8 frames, not 5:99"),
+        ("a.png", {"unit": "mile"}, "must be one of"),
     ],
 )
 def test_options_are_checked(tmp_path: Path, name: str, options: Any, text: str) -> None:

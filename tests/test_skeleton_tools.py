@@ -97,7 +97,7 @@ def test_a_name_that_repeats_is_renamed_by_its_address() -> None:
 @pytest.mark.parametrize(
     ("mapping", "reason"),
     [
-        ({"LeftAm": "x"}, "no joint 'LeftAm' among .*did you mean 'LeftArm'"),
+        ({"LeftAm": "x"}, "no joint 'LeftAm'; the joints are .*did you mean 'LeftArm'"),
         ({"LeftArm": "RightArm"}, "2 joints would have the name 'RightArm'"),
         ({"LeftArm": "x", "RightArm": "x"}, "rename: 2 joints would have the name 'x'"),
         ({"LeftArm": ""}, "'' is not a valid name for joint 'LeftArm'"),
@@ -240,7 +240,7 @@ def test_a_value_that_is_not_known_stays_unknown_where_it_is_held() -> None:
     ("joints", "reason"),
     [
         ([], "select: keep at least one joint"),
-        ("Hipps", "no joint 'Hipps' among .*did you mean 'Hips'"),
+        ("Hipps", "no joint 'Hipps'; the joints are .*did you mean 'Hips'"),
         (["Hips", 99], "no joint 99"),
         (["Hips", "LeftFoot"], "joint 'LeftLeg' moves 'LeftFoot', which is kept"),
         (["LeftFoot"], "joint 'LeftLeg' moves 'LeftFoot'"),

@@ -129,7 +129,7 @@ def test_unknown_units_have_steps_in_their_own() -> None:
             {"step": 1, "quality": "nobdy=1mm"},
             "no joint or group 'nobdy'; the names are feet, hands",
         ),
-        ({"step": 1, "lossless": "spne"}, "among feet, hands, .*; did you mean 'spine'"),
+        ({"step": 1, "lossless": "spne"}, "the names are feet, hands, .*; did you mean 'spine'"),
     ],
 )
 def test_options_out_of_reach(params: dict[str, Any], words: str) -> None:
