@@ -488,7 +488,9 @@ def test_the_viewer_of_rerun_needs_a_screen(
 
 @pytest.mark.parametrize("make", [mcz.from_pybvh, mcz.from_ezc3d, mcz.from_c3d, mcz.from_movement])
 def test_a_path_is_none_of_these(make: Any) -> None:
-    with pytest.raises(mcz.OptionError, match=r"not a pybvh|not an ezc3d|neither|not a poses dataset"):
+    with pytest.raises(
+        mcz.OptionError, match=r"not a pybvh|not an ezc3d|neither|not a poses dataset"
+    ):
         make("walk")
 
 

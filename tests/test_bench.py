@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis import to_parameter
 from scipy.interpolate import PchipInterpolator
 
 import mcz
@@ -60,7 +60,7 @@ def test_points_that_a_smaller_one_matches_do_not_count() -> None:
     assert bd_rate(line(), bent) == pytest.approx(0)
 
 
-@to_parameter(st.lists(st.floats(0.01, 10), min_size=4, max_size=12), st.integers(0, 2**32 - 1))
+@given(st.lists(st.floats(0.01, 10), min_size=4, max_size=12), st.integers(0, 2**32 - 1))
 def test_the_interpolation_is_that_of_scipy(steps: list[float], seed: int) -> None:
     x = np.cumsum(steps)
     y = np.cumsum(np.random.default_rng(seed).uniform(0.01, 10, len(x)))
@@ -192,7 +192,7 @@ def test_a_second_run_comes_from_the_cache(
     kept = tasks.Cache(tmp_path / "cache")
     task = Task("point", case, preset_of("mrdwt", "khan2016"), (("T_g", 3.0),))
     first = Runner(1, kept).run([task, task])
-    monkeypatch.setattr(tasks, "perform", lambda *to_parameter: pytest.fail("measured again"))
+    monkeypatch.setattr(tasks, "perform", lambda *given: pytest.fail("measured again"))
     again = Runner(1, kept)
     assert again.run([task]) == first
     assert (again.n_cached, again.n_run) == (1, 0)

@@ -205,7 +205,9 @@ def test_a_joint_of_nearly_this_name_is_suggested(samples: Path) -> None:
     ):
         skeleton.find("hed")
     many = replace(skeleton, joints=tuple(mcz.Joint(f"j{n}") for n in range(500)))
-    with pytest.raises(mcz.MotionError, match=r"the joints are j0, .*j39 \.\.\. \(500 in all\)") as raised:
+    with pytest.raises(
+        mcz.MotionError, match=r"the joints are j0, .*j39 \.\.\. \(500 in all\)"
+    ) as raised:
         many.find("xyz")
     assert len(str(raised.value)) < 400
 
