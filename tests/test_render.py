@@ -72,9 +72,9 @@ def test_the_floor_is_below_the_feet_and_all_is_seen(walk: Motion) -> None:
     for view in VIEWS:
         stage = stage_of(track, THEMES["light"], view, Viewport(10, 20, 300, 200), None, 15.0)
         for number, (_, nodes) in enumerate(track):
-            seen, _ = stage.camera_of(number).project(nodes[track.body.shown])
+            seen, _ = stage.camera_of(number).project(nodes[track.body.drawn_nodes])
             assert ((seen > (10, 20)) & (seen < (310, 220))).all()
-            assert nodes[track.body.shown, 2].min() > track.floor - 0.05 * track.size
+            assert nodes[track.body.drawn_nodes, 2].min() > track.floor - 0.05 * track.size
     assert track.unit == "cm"
     assert track.size == pytest.approx(170, rel=0.1)
 
@@ -146,7 +146,7 @@ def test_bones_of_a_skeleton(walk: Motion) -> None:
     assert len(body.bones) == 6
     shown = remove_false_bones(body, body.places(np.zeros((3, 3))))
     assert len(shown.bones) == 4
-    assert 0 not in shown.shown
+    assert 0 not in shown.drawn_nodes
     assert [body.sides[node] == MIDDLE for node in range(5)] == [True, True, False, False, True]
 
 

@@ -349,7 +349,7 @@ def test_what_cannot_be_done_is_refused() -> None:
             walk,
             replace(skeleton, joints=(flat, *skeleton.joints[1:])),
             None,
-            "ASF cannot hold channel tz of joint",
+            "lacks channel tz",
         ),
     ):
         with pytest.raises(OptionError, match=reason):

@@ -24,7 +24,7 @@ def without_npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / page.VIEWER).mkdir(parents=True)
     (tmp_path / page.VIEWER / "build.mjs").touch()
     monkeypatch.delenv(page.OTHER, raising=False)
-    monkeypatch.setattr(page, "built", lambda say: build_page(say, tmp_path))
+    monkeypatch.setattr(page, "build_page", lambda say: build_page(say, tmp_path))
     monkeypatch.setattr(shutil, "which", lambda name: None)
 
 
