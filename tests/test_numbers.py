@@ -16,7 +16,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mcz import FormatError, SourceError
-from mcz.model.numbers import Grid, GridFlag, GridKind, Tokens, choose_grid, fit, print_values, scan
+from mcz.model.numbers import (
+    Grid,
+    GridFlag,
+    GridKind,
+    Tokens,
+    choose_grid,
+    fit,
+    kernels,
+    print_values,
+    scan,
+)
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 PLAIN = [flag for flag in GridFlag if flag not in (GridFlag.POINT, GridFlag.EXPONENT1)]
@@ -385,6 +395,35 @@ def test_tokens_that_are_no_finite_numbers() -> None:
 def test_long_tokens() -> None:
     texts = ["0" * 400 + "1." + "3" * 400, "1" * 310, "-0." + "0" * 330 + "7", "1e-" + "9" * 30]
     assert bits(tokens_of(*texts).values()) == bits(np.array([float(text) for text in texts]))
+
+
+@given(
+    st.from_regex(r"[-+]?[0-9]{1,9}(\.[0-9]{0,9})?|[-+]?[0-9]{0,6}\.[0-9]{1,12}", fullmatch=True),
+    st.sampled_from(["", "e-07", "E+9"]),
+    st.sampled_from([0, 16]),  # what lies before a token decides how it is read
+)
+def test_notation_of_a_number(text: str, exponent: str, start: int) -> None:
+    data = b"9" * start + (text + exponent).encode()
+    mantissa, power, shape = scan(data, [start], [len(data)]).fields[0].tolist()
+    first, point, last = text.lstrip("+-").partition(".")
+    assert mantissa == int(first + last)
+    assert power == int(exponent[1:] or 0)
+    assert shape >> kernels.SIGNIFICANT & 31 == len((first + last).strip("0"))
+    assert shape >> kernels.FRACTION_DIGITS & 65535 == len(last)
+    assert bool(shape & kernels.POINT) == bool(point)
+    assert bool(shape & kernels.NO_INTEGER) == (first == "")
+    assert bool(shape & kernels.ZERO_INTEGER) == (first == "0")
+    assert bool(shape & kernels.EXTRA_ZERO) == (first[:1] == "0" and len(first) > 1)
+    assert shape & (kernels.MINUS | kernels.PLUS) == "-+".find(text[0]) + 1
+    assert not shape & (kernels.BAD | kernels.LONG)
+
+
+@pytest.mark.parametrize(
+    "text", ["1.2.3", "1234567.9.", "1/2", "1:2", ".", "-", "12345678,5", "1\xe9"]
+)
+def test_words_like_numbers_are_none(text: str) -> None:
+    word = text.encode("latin-1")
+    assert scan(b"9" * 16 + word, [16], [16 + len(word)]).bad().all()
 
 
 def test_tokens_can_be_chosen() -> None:

@@ -22,6 +22,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.coding.forms.product_kernels",
         "mcz.model.numbers.kernels",
         "mcz.model.numbers.print_kernels",
+        "mcz.model.numbers.scan_kernels",
         "mcz.model.numbers.survey_kernels",
         "mcz.model.numbers.value_kernels",
         "mcz.sources.text.text_kernels",

@@ -1,4 +1,4 @@
-"""Loops over decimal numbers in text: read them, compare them with a grid, print them.
+"""Loops over decimal numbers in text: compare them with a grid, print them.
 
 A token is described by a row of three int64, which determines its text unless LONG:
 
@@ -37,57 +37,6 @@ _POINT_ZERO, _POINT_ONLY, _NO_ZERO, _PLUS, _EXP3, _EXP1, _UPPER = 1, 2, 4, 8, 16
 
 
 @kernel
-def scan(text: Bytes, start: Ints, stop: Ints, fields: Ints2) -> int:
-    """Fill ``fields`` (n, 3) from tokens ``text[start[i]:stop[i]]``; returns the number of bad
-    ones.
-    """
-    n_bad = 0
-    for token in range(len(start)):
-        at, end = start[token], stop[token]
-        shape = 0
-        if at < end and (text[at] == 45 or text[at] == 43):
-            shape = MINUS if text[at] == 45 else PLUS
-            at += 1
-        first = at
-        point = -1
-        mantissa = 0
-        digits = 0  # of the mantissa, leading zeros left out
-        significant = 0
-        while at < end:
-            digit = int(text[at]) - 48
-            if digit == -2 and point < 0:
-                point = at
-            elif 0 <= digit <= 9:
-                if digit or digits:
-                    digits += 1
-                    if digits <= 18:
-                        mantissa = mantissa * 10 + digit
-                    if digit:
-                        significant = digits
-            else:
-                break
-            at += 1
-        fraction = at - point - 1 if point >= 0 else 0
-        integers = at - first - fraction - (1 if point >= 0 else 0)
-        shape |= POINT if point >= 0 else 0
-        shape |= LONG if digits > 18 else 0
-        shape |= BAD if integers + fraction == 0 else 0
-        if integers == 0:
-            shape |= NO_INTEGER
-        elif text[first] == 48:
-            shape |= ZERO_INTEGER if integers == 1 else EXTRA_ZERO
-        shape |= min(significant, 31) << SIGNIFICANT
-        shape |= min(fraction, 65535) << FRACTION_DIGITS
-        power = 0
-        if at < end:
-            power, bits = _exponent(text, at, end)
-            shape |= bits
-        fields[token, 0], fields[token, 1], fields[token, 2] = mantissa, power, shape
-        n_bad += 1 if shape & BAD else 0
-    return n_bad
-
-
-@kernel
 def values(fields: Ints2, tens: Floats, out: Floats, slow: Flags) -> int:
     """Fill ``out`` with the nearest binary64 of each token; returns the number of tokens left out.
 
@@ -105,28 +54,6 @@ def values(fields: Ints2, tens: Floats, out: Floats, slow: Flags) -> int:
         value = scaled(mantissa, power, tens) if mantissa else 0.0
         out[token] = -value if shape & MINUS else value  # TEXT-03
     return n_slow
-
-
-def _exponent(text: Bytes, at: int, end: int) -> tuple[int, int]:
-    """The number after the ``e`` at ``at``, and bits of the shape."""
-    if text[at] != 101 and text[at] != 69:
-        return 0, BAD
-    shape = EXPONENT | UPPER if text[at] == 69 else EXPONENT
-    at += 1
-    negative = False
-    if at < end and (text[at] == 45 or text[at] == 43):
-        shape |= EXPONENT_SIGN
-        negative = text[at] == 45
-        at += 1
-    power = 0
-    digits = 0
-    while at < end and 48 <= text[at] <= 57:
-        power = min(power * 10 + int(text[at]) - 48, HUGE)
-        digits += 1
-        at += 1
-    if digits == 0 or at < end:  # TEXT-05
-        shape |= BAD
-    return (-power if negative else power), shape | min(digits, 255) << EXPONENT_DIGITS
 
 
 @kernel
@@ -147,9 +74,17 @@ def match(
     """
     digits, decimals, trim, low, high, flags, limit = rule
     refused = LONG | SPECIAL | BAD | EXTRA_ZERO | (0 if digits else EXPONENT)
+    seen, usual = 0, 1  # bits of a shape, and their values in a number of fixed decimals; none
+    if digits == 0 and trim == 0 and flags == 0:
+        seen = refused | PLUS | NO_INTEGER | POINT | 65535 << FRACTION_DIGITS
+        usual = (POINT if decimals else 0) | decimals << FRACTION_DIGITS
     misses = 0
     for token in range(len(fields)):
         mantissa, power, shape = fields[token, 0], fields[token, 1], fields[token, 2]
+        if shape & seen == usual and mantissa <= limit:
+            ordinals[token] = mantissa ^ -(shape & MINUS)
+            printed[token] = True
+            continue
         places = (shape >> FRACTION_DIGITS) & 65535
         good = shape & refused == 0 and (shape & PLUS != 0) == (
             flags & _PLUS != 0 and shape & MINUS == 0
@@ -185,7 +120,7 @@ def match(
 def length(mantissa: int) -> int:
     """Decimal digits of ``mantissa``, 0 for 0."""
     digits = bit_length(mantissa) * 1233 >> 12  # log 2 is 1233 / 4096
-    return digits + 1 if mantissa >= POWERS[digits] else digits
+    return digits + (1 if mantissa >= POWERS[digits] else 0)
 
 
 def _general(mantissa: int, power: int, digits: int) -> int:

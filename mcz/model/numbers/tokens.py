@@ -111,6 +111,11 @@ class Tokens:
         result: Bools = (self.fields[:, 2] & kernels().BAD) != 0
         return result
 
+    def styled(self) -> Bools:
+        """Mask of the tokens with a plus sign, or without a digit before their point."""
+        result: Bools = (self.fields[:, 2] & (kernels().PLUS | kernels().NO_INTEGER)) != 0
+        return result
+
     def values(self) -> Floats:
         """The nearest binary64 of each token; SourceError names the first that is not a number."""
         if not self.known:
@@ -131,10 +136,12 @@ class Tokens:
                 f"{quote(hard.token(first))} is not a number", offset=hard.start[first]
             )
         special = hard.fields[:, 2] & loops.SPECIAL != 0
-        texts = zip(hard.texts().tolist(), special.tolist(), strict=True)
-        out[slow_tokens] = [
-            _value(text) if is_special else float(text) for text, is_special in texts
-        ]
+        texts = hard.texts().tolist()
+        if special.any():
+            pairs = zip(texts, special.tolist(), strict=True)
+            out[slow_tokens] = [_value(t) if is_special else float(t) for t, is_special in pairs]
+        else:
+            out[slow_tokens] = list(map(float, texts))
         return out
 
 
@@ -148,13 +155,12 @@ def scan(
     whole.flags.writeable = False  # the view is read-only
     start = np.ascontiguousarray(start, np.int64)
     stop = np.ascontiguousarray(stop, np.int64)
-    if len(start) != len(stop) or (
-        len(start) and not (start.min() >= 0 and (start <= stop).all() and stop.max() <= len(whole))
-    ):
-        raise IndexError(f"tokens lie outside a text of {len(whole)} bytes")
     loops = kernels()
+    scanner = importlib.import_module("mcz.model.numbers.scan_kernels")
     fields = np.empty((len(start), 3), np.int64)
-    n_bad = loops.scan(whole, start, stop, fields)
+    n_bad = scanner.scan(whole, start, stop, fields) if len(start) == len(stop) else scanner.OUTSIDE
+    if n_bad == scanner.OUTSIDE:
+        raise IndexError(f"tokens lie outside a text of {len(whole)} bytes")
     tokens = Tokens(whole, start, stop, fields)
     for index in np.flatnonzero(fields[:, 2] & loops.BAD).tolist() if n_bad else ():
         if not np.isfinite(_value(tokens.token(index), fallback=0.0)):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import OptionError, SourceError
 from mcz.model.motion import Exceptions, Signal
-from mcz.model.numbers import Grid, GridFlag, Tokens, fit, scan
+from mcz.model.numbers import Grid, GridFlag, GridKind, Tokens, fit, scan
 from mcz.model.text_format import quote
 from mcz.sources.text.rows import Rows, line_of
 
@@ -23,6 +23,7 @@ Ints = NDArray[np.int64]
 CANDIDATES = 8  # grids of single columns that are tried on all of them
 BLOCK = 512  # rows that may have a grid of their own
 WORTH = 32  # exceptions that a change of grid must save
+RARE = 1 / 200  # exceptions of a column, by its tokens, that are cheaper than a digit more for each
 
 
 def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
@@ -82,7 +83,7 @@ def _grids(
     if printed.all():
         return (common,) * n_columns, (), printed
     places = _by_column(mask)
-    own = {c: fit(tokens[at])[::2] for c, (at, _) in enumerate(places) if not printed[at].all()}
+    own = {c: fit(tokens[places[c][0]])[::2] for c in _doubtful(tokens, mask, common, printed)}
     common, printed = _common_grid(tokens, [grid for grid, _ in own.values()], common, printed)
     grids, changes = [common] * n_columns, []
     for c, (grid, mine_printed) in own.items():
@@ -93,6 +94,20 @@ def _grids(
             blocks, printed[at] = _by_blocks(tokens[at], row, grids[c], printed[at], n_each)
             changes += [(first, c, change) for first, change in blocks]
     return tuple(grids), tuple(sorted(changes, key=lambda change: change[:2])), printed
+
+
+def _doubtful(tokens: Tokens, mask: Bools, common: Grid, printed: Bools) -> list[int]:
+    """The columns with exceptions to which another grid than ``common`` may fit better."""
+    missed = np.flatnonzero(~printed)
+    cells = missed if mask.all() else np.flatnonzero(mask)[missed]
+    n_columns = mask.shape[1]
+    misses = np.bincount(cells % n_columns, minlength=n_columns)
+    doubtful = misses > 0
+    if common.kind == GridKind.FIXED and common.digits and not common.flags:
+        doubtful &= misses >= RARE * np.count_nonzero(mask, axis=0)
+        doubtful[cells[tokens[missed].styled()] % n_columns] = True  # nearly all others are plain
+    columns: list[int] = np.flatnonzero(doubtful).tolist()
+    return columns
 
 
 def _by_column(mask: Bools) -> list[tuple[slice | Ints, Ints]]:

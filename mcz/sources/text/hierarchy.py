@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import islice
 from math import isfinite
 
@@ -22,9 +23,15 @@ from mcz.sources.text.source import MOST_CHANNELS, MOST_DEPTH, MOST_JOINTS, chec
 _KINDS = {"position": "t", "rotation": "r", "scale": "s"}
 _NAMES = {f"{k}{a}": f"{a.upper()}{name}" for name, k in _KINDS.items() for a in "xyz"}
 _WORD = re.compile(rb"(?:[\x00-\x20]++|#[^\n]*+)*+([{}]|[^\x00-\x20{}]+)")
+# The usual text behind a keyword, in one match; what does not match is read word by word.
+_NUMBERS = re.compile(rb"[\t ]+([^\x00-\x20{}#][^\x00-\x20{}]*)" * 3 + rb"(?=[\x00-\x20{}])")
+_KNOWN_CHANNELS = re.compile(
+    rb"[\t ]+([0-9]{1,9})((?:[\t ]+[XYZxyz](?:position|rotation))+)(?=[\t\r\n ])"
+)
 _JOINT_LINE = re.compile(rb"(?im)^[\t ]*(?:ROOT|JOINT)\b")
 _MOTION_LINE = re.compile(rb"(?im)^[\t ]*MOTION\b")
 _REST = re.compile(rb"[^\n{]*")
+_NO_CHANNELS = (b"", b"{", b"}", b"ROOT", b"JOINT", b"END", b"OFFSET", b"MOTION")
 BLANKS = bytes(range(0x21))
 MAX_INDENT = 64  # tabs; joints may lie deeper
 
@@ -81,7 +88,7 @@ class _Reader:
             elif word == b"OFFSET" and open_nodes:
                 open_nodes[-1][1].offset = self._vector()
             elif word == b"CHANNELS" and open_nodes and not open_nodes[-1][1].end:
-                open_nodes[-1][1].channels = tuple(self._channels())
+                open_nodes[-1][1].channels = tuple(self._known_channels() or self._channels())
                 self.n_channels += len(open_nodes[-1][1].channels)
                 self.check("channels", self.n_channels, MOST_CHANNELS)
             elif word == b"}" and open_nodes:
@@ -113,11 +120,14 @@ class _Reader:
         return len(self.joints) - 1, node
 
     def _vector(self) -> Vector:
-        x, y, z = (self._number() for _ in range(3))
-        return x, y, z
+        match = _NUMBERS.match(self.data, self.at)
+        if match is None:
+            x, y, z = (self._number(self.word()) for _ in range(3))
+            return x, y, z
+        self.at = match.end()
+        return self._number(match[1]), self._number(match[2]), self._number(match[3])
 
-    def _number(self) -> float:
-        word = self.word()
+    def _number(self, word: bytes) -> float:
         try:
             number = float(word)
         except ValueError:
@@ -126,31 +136,36 @@ class _Reader:
             raise self.error(f"expected a number, not {quote(word)}")
         return number
 
+    def _known_channels(self) -> list[Channel]:
+        """The channels where all are known and as many as are counted, and no word follows."""
+        match = _KNOWN_CHANNELS.match(self.data, self.at)
+        names = match[2].split() if match else []
+        if match is None or len(names) != int(match[1]):
+            return []
+        self.at = match.end()
+        self._refuse_another(len(names))
+        return [channel(name.decode()) for name in names]
+
     def _channels(self) -> Iterator[Channel]:
         count = self.word()
         if not count.isdigit() or len(count) > 9:
             raise self.error(f"CHANNELS {quote(count)} is not a count")
         for k in range(int(count)):
             word = self.word()
-            known = word.upper() in (
-                b"",
-                b"{",
-                b"}",
-                b"ROOT",
-                b"JOINT",
-                b"END",
-                b"OFFSET",
-                b"MOTION",
-            )
-            if known:
+            if word.upper() in _NO_CHANNELS:
                 raise self.error(f"CHANNELS {int(count)}, but {k} channels are named")
             yield channel(word.decode("latin-1"))
+        self._refuse_another(int(count))
+
+    def _refuse_another(self, count: int) -> None:
+        """Raise SourceError where another channel follows."""
         after = self.at
         if channel(self.word().decode("latin-1")).kind:
-            raise self.error(f"CHANNELS {int(count)}, but more channels are named")
+            raise self.error(f"CHANNELS {count}, but more channels are named")
         self.at = after
 
 
+@lru_cache(256)
 def channel(name: str) -> Channel:
     """The channel of a BVH name: "Xrotation" is rx; an unknown one is a plain scalar."""
     kind = _KINDS.get(name[1:].lower(), "") + name[:1].lower()

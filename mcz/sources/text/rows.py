@@ -35,6 +35,7 @@ Frames = Callable[[int], tuple[list[Token], int] | None]
 
 SPARSE, DENSE = 16, 2  # cells a byte: where a row names its columns, and where each has a cell
 FEW_CELLS = 2**18  # that any file may have
+GROWTH = 16  # of the room for rows at once: the first rows tell little of all others
 MAX_NUMBER = 10**15  # of a frame, either sign
 LOOK_FOR_PADDING = (8, 64)  # numbers of patterns at which to look for padded columns
 _TAIL = re.compile(rb"[\x00-\x09\x0b-\x20]*\n?")
@@ -185,7 +186,7 @@ class _Reader:
                 "most frames, so a table would be far larger than the file"
             )
         expected = int((self.row + 1) * size / max(1, done) * 1.01) + 64
-        n_rows = max(min(expected, 4 * len(self.numbers)), len(self.numbers) * 3 // 2)
+        n_rows = max(min(expected, GROWTH * len(self.numbers)), len(self.numbers) * 3 // 2)
         n_rows = max(min(n_rows, most), self.row + 2)
         old = self.start, self.stop, self.numbers
         self._allocate(n_rows)

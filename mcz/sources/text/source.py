@@ -29,6 +29,8 @@ LOOKED_AT = 64  # bytes in which every other one of UTF-16 is zero
 
 def text_encoding(data: bytes) -> str:
     """ "utf-8" where all of ``data`` is, otherwise "latin-1", which every byte string is."""
+    if data.isascii():
+        return "utf-8"
     try:
         data.decode("utf-8")
     except UnicodeDecodeError:

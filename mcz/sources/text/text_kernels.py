@@ -5,7 +5,7 @@ Blanks are the bytes up to 0x20.
 
 from __future__ import annotations
 
-from mcz.kernels import eight_bytes, kernel, put_eight_bytes
+from mcz.kernels import eight_bytes, kernel, put_eight_bytes, trailing_zeros
 from mcz.kernels.types import Bytes, Ints, Ints2
 from mcz.sources.text import BLANKS, FREE, MARKUP, WORDS, Items
 
@@ -25,6 +25,13 @@ def _is_at(text: Bytes, at: int, gaps: Bytes, start: int, stop: int) -> bool:
 
 def _token_end(text: Bytes, at: int, cells: int) -> int:
     if cells == WORDS:
+        while at + 8 <= len(text):
+            word = eight_bytes(text, at)
+            others = word ^ -1
+            blanks = word - 0x0021212121212121 & others & 0x0080808080808080  # seven at once
+            if blanks:
+                return at + (trailing_zeros(blanks) >> 3)
+            at += 7
         while at < len(text) and text[at] > BLANK:
             at += 1
         return at
