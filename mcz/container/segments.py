@@ -345,7 +345,7 @@ def parse_group_notes(data: bytes, n_rows: int, grids: Sequence[Grid], name: str
     if not data:
         return [], []
     where = f"clip {name!r}, group notes"
-    fields = parse(GroupNotes, data, where)
+    fields = _group_notes(data, where)
     n_channels = len(grids)
     changes = [(c.channel, c.grid) for c in fields.grid_changes]
     channels = [channel for channel, _ in changes]
@@ -377,3 +377,19 @@ def values_of_exceptions(texts: Sequence[bytes], name: str) -> NDArray[np.float6
         text = texts[int(np.argmax(bad))]
         raise FormatError(f"exception {text[:40]!r} is not a number", clip=name)
     return values
+
+
+_known: dict[bytes, GroupNotes] = {}
+MOST_KNOWN, MOST_BYTES = 1024, 64  # notes that are kept, and bytes of one
+
+
+def _group_notes(data: bytes, where: str) -> GroupNotes:
+    """The record of ``data``, which nobody may change: short notes are alike in many groups."""
+    fields = _known.get(data)
+    if fields is None:
+        fields = parse(GroupNotes, data, where)
+        if len(data) <= MOST_BYTES:
+            if len(_known) >= MOST_KNOWN:
+                _known.clear()  # as other threads may do: nothing is iterated over
+            _known[data] = fields
+    return fields

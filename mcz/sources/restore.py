@@ -6,6 +6,8 @@ SPEC.md, "Source reconstruction", is normative.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from io import SEEK_END, BytesIO
 from itertools import pairwise
 
 import numpy as np
@@ -16,12 +18,20 @@ from mcz.kernels import SPARE
 from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind, print_values, scan
-from mcz.model.types import Ints, Values
+from mcz.model.numbers.magnitudes import POWERS
+from mcz.model.numbers.textgrids import WIDEST
+from mcz.model.numbers.tokens import TENS
+from mcz.model.numbers.values import print_rules
+from mcz.model.types import Floats, Ints, Values
+from mcz.sources.text import Items
 from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, parse_layout
 from mcz.sources.text.notes import RowNotes
+from mcz.sources.text.rows import MAX_NUMBER
 
 TEXT_LIMIT = 2**26  # bytes that any text may have
 TEXT_PER_CELL = 512  # bytes a cell of a larger text, with one more row and channel
+Bytes = NDArray[np.uint8]
+Run = tuple[Pattern, int, int]  # the pattern of rows start <= r < stop
 TEXT_PER_SIZE = 4  # most bytes of a larger text, as a multiple of the source file's stated size
 
 
@@ -41,13 +51,14 @@ def restore(motion: Motion, source: Source) -> bytes:
     runs = pattern_runs(layout, notes, signal.n_rows)
     if prints_frame_numbers(runs) and signal.samples_per_frame != 1:  # AMC-08
         raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
-    rows = rows_text(
-        signal, layout, notes, numbers_or_rows(motion.frame_numbers, signal.n_rows), limit
-    )
     header = layout.header[0]
     if len(layout.header) > 1:
         header = printed_count(layout, signal.n_rows).join(layout.header)
-    return b"".join((header, rows))
+    out = BytesIO()
+    out.write(header)
+    numbers = numbers_or_rows(motion.frame_numbers, signal.n_rows)
+    write_rows(out, signal, layout, notes, numbers, limit)
+    return out.getvalue()
 
 
 def printed_count(layout: Layout, n_rows: int) -> bytes:
@@ -61,40 +72,39 @@ def text_limit(source: Source, shapes: Sequence[tuple[int, int]]) -> int:
     return min(limit, max(TEXT_LIMIT, TEXT_PER_SIZE * source.size)) if source.size else limit
 
 
-def rows_text(
+def write_rows(
+    out: BytesIO,
     signal: Signal,
     layout: Layout,
     notes: RowNotes | None,
     numbers: Ints,
     limit: int,
     missing: bytes | None = None,
-) -> memoryview:
-    """All rows and what follows them; ``signal`` has the columns of the patterns.
+) -> None:
+    """Write all rows and what follows them; ``signal`` has the columns of the patterns.
 
     ``numbers`` are the frame numbers of the rows. ``missing``: what stands where the signal is
     invalid, None where that does not matter. Raises as ``restore`` does.
     """
     runs = pattern_runs(layout, notes, signal.n_rows)
-    numbered = prints_frame_numbers(runs)
-    cells = Cells(signal, numbers if numbered else None)
-    if numbered and notes is not None:
+    texts: list[tuple[int, bytes]] = []
+    if notes is not None and prints_frame_numbers(runs):
         texts = [entry for entry in notes.texts if entry[0] < signal.n_rows]  # AMC-06
-        rows = np.array([row for row, _ in texts], dtype=np.int64)
-        cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
-    if missing is not None and signal.mask is not None:
-        cells.set_same(~signal.mask, missing)  # TABLE-04
-    return _body(cells, runs, limit, layout.ending)
+    missing = None if signal.mask is None else missing
+    for piece in Rows(signal, numbers, runs, texts, missing, limit).pieces():
+        out.write(piece)
+    if layout.ending is not None:
+        out.seek(-len(runs[-1][0].tail) if runs else 0, SEEK_END)
+        out.write(layout.ending)  # AMC-06
+        out.truncate()
 
 
-def prints_frame_numbers(runs: Sequence[tuple[Pattern, int, int]]) -> bool:
+def prints_frame_numbers(runs: Sequence[Run]) -> bool:
     """Return True if rows print their frame number."""
     return any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
 
 
-def pattern_runs(
-    layout: Layout, notes: RowNotes | None, n_rows: int
-) -> list[tuple[Pattern, int, int]]:
-    """(pattern, start, stop) of each run of rows."""
+def pattern_runs(layout: Layout, notes: RowNotes | None, n_rows: int) -> list[Run]:
     indices = np.zeros(n_rows, np.int64)
     if notes is not None:
         indices[: len(notes.patterns)] = notes.patterns[:n_rows]
@@ -108,39 +118,133 @@ def pattern_runs(
     return [(layout.patterns[indices[a]], a, b) for a, b in pairwise(edges)]
 
 
-def _body(
-    cells: Cells, runs: list[tuple[Pattern, int, int]], limit: int, ending: bytes | None
-) -> memoryview:
-    """The text of all rows; its size is known before any of it is written.
+SCRATCH = 2**20  # bytes for rows while they are printed, fewer than a processor's cache has
+NEAR = 64  # rows beside one with an odd cell that are taken with it
 
-    ``ending`` stands in place of the last tail, unless it is None.
+
+@dataclass(slots=True)
+class Rows:
+    """The rows of a table: most are printed by ``print_rows``, those with odd cells by ``Cells``.
+
+    ``texts``: (row, odd text of its frame number). ``missing``: what stands where the mask of the
+    signal is False, None for its values.
     """
-    from mcz.sources.text import text_kernels
 
-    texts = cells.texts()
-    arrays = {id(pattern): pattern.arrays() for pattern, _, _ in runs}
-    size = 0
-    for pattern, a, b in runs:
-        size += text_kernels.measure_rows(
-            arrays[id(pattern)], pattern.gap_size, texts, cells.start[a:b], cells.size[a:b]
+    signal: Signal
+    numbers: Ints
+    runs: Sequence[Run]
+    texts: Sequence[tuple[int, bytes]]
+    missing: bytes | None
+    limit: int
+    size: int = 0  # of all rows so far
+    items: dict[int, Items] = field(default_factory=dict)  # of patterns, by identity
+    scratch: Bytes = field(default_factory=lambda: np.empty(0, np.uint8))
+
+    def pieces(self) -> Iterator[memoryview]:
+        """The text of all rows; a piece is valid until the next one.
+
+        Raises LimitError before it takes more memory than the limit allows.
+        """
+        row = 0
+        for first, last in self._odd_spans():
+            yield from self._usual(row, first)
+            yield self._odd(first, last)
+            row = last
+        yield from self._usual(row, self.signal.n_rows)
+
+    def _odd_spans(self) -> list[tuple[int, int]]:
+        """Rows start <= r < stop that ``print_rows`` cannot print, as far as is known before."""
+        n_rows = self.signal.n_rows
+        padded = any(run.width for pattern, _, _ in self.runs for run in pattern.runs)
+        simple = self.missing is None and self.signal.samples_per_frame == 1 and not padded
+        if n_rows and not (simple and np.abs(self.numbers).max() < MAX_NUMBER):
+            return [(0, n_rows)]
+        spans: list[tuple[int, int]] = []
+        for row in sorted({*self.signal.exceptions.rows.tolist(), *(r for r, _ in self.texts)}):
+            near = spans and row < spans[-1][1] + NEAR
+            spans.append((spans.pop()[0] if near else row, row + 1))
+        return spans
+
+    def _odd(self, first: int, last: int) -> memoryview:
+        """Rows with any cells; their size is known before any of them is written."""
+        from mcz.sources.text import text_kernels
+
+        whole = (first, last) == (0, self.signal.n_rows)
+        signal = self.signal if whole else self.signal.cut(first, last)
+        runs = [(p, a - first, b - first) for p, a, b in _clipped(self.runs, first, last)]
+        cells = Cells(signal, self.numbers[first:last] if prints_frame_numbers(runs) else None)
+        odd = [(row - first, text) for row, text in self.texts if first <= row < last]
+        rows = np.array([row for row, _ in odd], dtype=np.int64)
+        cells.set(rows, np.full_like(rows, -1), [text for _, text in odd])
+        if self.missing is not None and signal.mask is not None:
+            cells.set_same(~signal.mask, self.missing)  # TABLE-04
+        texts = cells.texts()
+        size = 0
+        for pattern, a, b in runs:
+            size += text_kernels.measure_rows(
+                self._items(pattern), pattern.gap_size, texts, cells.start[a:b], cells.size[a:b]
+            )
+        self._count(size)
+        out = np.empty(size + SPARE, np.uint8)
+        at = 0
+        for pattern, a, b in runs:
+            at = text_kernels.fill_rows(
+                out, at, self._items(pattern), texts, cells.start[a:b], cells.size[a:b]
+            )
+        return out.data[:size]
+
+    def _usual(self, first: int, last: int) -> Iterator[memoryview]:
+        """Rows without known odd cells; those near an unprintable number are left to ``_odd``."""
+        values = np.ascontiguousarray(self.signal.values, np.float64)
+        n_odd = NEAR
+        for start, stop, grids in _grid_runs(self.signal):
+            rules = print_rules(grids)
+            for pattern, row, end in _clipped(self.runs, max(first, start), min(last, stop)):
+                while row < end:
+                    done, text = self._print_rows(pattern, values[row:end], row, rules)
+                    row += done
+                    if done:
+                        yield text
+                    else:
+                        yield self._odd(row, min(row + n_odd, end))
+                        row, n_odd = min(row + n_odd, end), 2 * n_odd  # a few calls at most
+
+    def _print_rows(
+        self, pattern: Pattern, values: Floats, row: int, rules: Ints
+    ) -> tuple[int, memoryview]:
+        """The number of rows printed, from ``row`` on, and their text."""
+        from mcz.sources.text import text_kernels
+
+        items = self._items(pattern)
+        room = pattern.gap_size + WIDEST * len(items.columns)
+        n_rows = max(1, min(len(values), SCRATCH // max(1, room)))
+        if len(self.scratch) < n_rows * room + SPARE:
+            self.scratch = np.empty(n_rows * room + SPARE, np.uint8)
+        numbers = self.numbers[row : row + n_rows]
+        done, size = text_kernels.print_rows(
+            values[:n_rows], numbers, rules, TENS, POWERS, items, self.scratch
         )
-    if size > limit:  # AMC-07, LIMIT-12
-        raise LimitError(f"source template: a text of {size} bytes, limit {limit}")
-    out = np.empty(size + len(ending or b"") + SPARE, np.uint8)
-    at = 0
-    for pattern, a, b in runs:
-        at = text_kernels.fill_rows(
-            out, at, arrays[id(pattern)], texts, cells.start[a:b], cells.size[a:b]
-        )
-    text = out.data
-    if ending is None:
-        return text[:size]
-    at -= len(runs[-1][0].tail) if runs else 0
-    text[at : at + len(ending)] = ending  # AMC-06
-    return text[: at + len(ending)]
+        self._count(size)
+        return done, self.scratch.data[:size]
+
+    def _items(self, pattern: Pattern) -> Items:
+        if id(pattern) not in self.items:
+            self.items[id(pattern)] = pattern.arrays()
+        return self.items[id(pattern)]
+
+    def _count(self, size: int) -> None:
+        self.size += size
+        if self.size > self.limit:  # AMC-07, LIMIT-12
+            raise LimitError(f"source template: a text of {self.size} bytes, limit {self.limit}")
 
 
-Bytes = NDArray[np.uint8]
+def _clipped(runs: Sequence[Run], first: int, last: int) -> Iterator[Run]:
+    """The runs of rows first <= r < last."""
+    for pattern, start, stop in runs:
+        if max(start, first) < min(stop, last):
+            yield pattern, max(start, first), min(stop, last)
+
+
 BLOCK = 2**17  # cells that are printed at a time
 INTEGERS = Grid(GridKind.FIXED)
 SHORTEST = Grid(GridKind.TEXT64)

@@ -233,13 +233,16 @@ class Clip(StoredClip):
                 raise
             return self.skeleton
 
-    def _motion(self, frames: tuple[int, int] | None, resolution: int, decimate: bool) -> Motion:
+    def _motion(
+        self, frames: tuple[int, int] | None, resolution: int, decimate: bool, hashed: bool = True
+    ) -> Motion:
         start, stop = self.checked_range(frames)
         self._check_resolution(self.signals[0], resolution)
         numbers = self.frame_numbers[start:stop]
+        signals = [self._read_signal(s, start, stop, resolution, hashed) for s in self.signals]
         motion = Motion(
             skeleton=self.skeleton,
-            signals=tuple(self._read_signal(s, start, stop, resolution) for s in self.signals),
+            signals=tuple(signals),
             frame_rate=self.frame_rate,
             frame_rate_exact=self.frame_rate_exact,
             name=self.name,
@@ -254,12 +257,13 @@ class Clip(StoredClip):
             return motion
         return motion.at_times(self.timeline and self.timeline.cut(slice(start, stop, step)))
 
-    def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
-        whole = (start, stop) == (0, self.n_frames)
+    def _read_signal(
+        self, info: SignalInfo, start: int, stop: int, resolution: int, hashed: bool
+    ) -> Signal:
         resolution = info.coarser(resolution)
         reader = SignalReader(self.container, info, None, resolution, self.name)
         signal = reader.signal(start + info.skip, stop + info.skip)
-        if whole and resolution == 0:
+        if hashed and (start, stop, resolution) == (0, self.n_frames, 0):
             self._check_whole(info, signal.values, signal.mask)
         if info.role == TIMES:
             self._check_times(info, signal.values, signal.mask)
@@ -377,16 +381,15 @@ class Clip(StoredClip):
         its format can. Raises ChecksumError where a lossless clip does not restore its original
         bytes.
         """
-        info = self.source
-        if info is None:
+        if (info := self.source) is None:
             raise OptionError("the clip has no source file", clip=self.name, hint=Hint.CONVERT)
         check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
-        motion = self._motion(frames, resolution, decimate)
+        is_file = self.gives_file(frames, resolution)
+        motion = self._motion(frames, resolution, decimate, hashed=not is_file)
         if motion.source is None and self.container.salvage:
             raise FormatError(
                 "the source file of the clip is lost", clip=self.name, hint=Hint.CONVERT
             )
-        is_file = self.gives_file(frames, resolution)
         if not is_file:
             motion = stating_rate(motion, self.frame_numbers)
         data: bytes = FORMATS[info.format].write(motion)

@@ -226,12 +226,10 @@ def put(
     scientific = mantissa != 0 and (power < low or power >= high)
     if scientific:
         fraction = count - 1
-    if negative or flags & _PLUS:  # TEXT-01
-        out[at] = 45 if negative else 43
-        at += 1
-    integers = count - fraction
-    if integers < 1:
-        integers = 0 if flags & _NO_ZERO and fraction > 0 else 1  # TEXT-01
+    out[at] = 45 if negative else 43
+    at += 1 if negative or flags & _PLUS else 0  # TEXT-01
+    least = 0 if flags & _NO_ZERO and fraction > 0 else 1  # TEXT-01
+    integers = max(least, count - fraction)
     end = at + integers
     if fraction > 0:
         digits = integers + fraction

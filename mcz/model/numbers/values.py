@@ -70,13 +70,18 @@ def print_values(
     ``start``, counted from ``base``, and ``size`` locate each, except on other grids, for values
     beyond their grid, and where no product or quotient of tens is exact.
     """
-    loops = _kernels("print")
-    rules = {grid: _print_rule(grid) for grid in dict.fromkeys(grids)}
-    of_channels = np.array([rules[grid] for grid in grids], np.int64).reshape(-1, loops.RULE_SIZE)
+    of_channels = print_rules(grids)
     out = np.empty(values.size * textgrids.WIDEST + SPARE, np.uint8)
     numbers = np.asarray(values, np.float64)
-    used = loops.fill(numbers, of_channels, TENS, POWERS, out, base, start, size)
+    used = _kernels("print").fill(numbers, of_channels, TENS, POWERS, out, base, start, size)
     return out[:used].copy()
+
+
+def print_rules(grids: Sequence[Grid]) -> Ints:
+    """The rules (channels, RULE_SIZE) of ``print_kernels``, whose last column it changes."""
+    rules = {grid: _print_rule(grid) for grid in dict.fromkeys(grids)}
+    size = _kernels("print").RULE_SIZE
+    return np.array([rules[grid] for grid in grids], np.int64).reshape(-1, size)
 
 
 def _print_rule(grid: Grid) -> tuple[int, ...]:

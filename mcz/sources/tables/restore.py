@@ -6,6 +6,7 @@ SPEC.md, "The text of tables", is normative.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Exceptions, Motion, Signal
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Ints
-from mcz.sources.restore import printed_count, rows_text, text_limit
+from mcz.sources.restore import printed_count, text_limit, write_rows
 from mcz.sources.tables.layout import Section, fill, parse_sections
 from mcz.sources.tables.source import TableNotes
 
@@ -40,16 +41,17 @@ def restore_table(motion: Motion) -> bytes:
     tables = [_section_table(motion, section) for section in sections]
     limit = text_limit(source, [table.values.shape for table, _ in tables])
     names = [joint.name for joint in motion.skeleton.joints]
-    out: list[bytes | memoryview] = []
+    out = BytesIO()
     for k, (section, (table, numbers)) in enumerate(zip(sections, tables, strict=True)):
         mine = notes.of(k, table.samples_per_frame, table.n_rows)
-        rows = rows_text(table, section.rows, mine, numbers, limit, section.missing)
-        limit -= len(rows)
         header = section.header
         if section.marked:
             header = fill(header, names, printed_count(section.rows, table.n_rows))
-        out += [header, rows]
-    return b"".join(out)
+        out.write(header)
+        begin = out.tell()
+        write_rows(out, table, section.rows, mine, numbers, limit, section.missing)
+        limit -= out.tell() - begin
+    return out.getvalue()
 
 
 def _section_table(motion: Motion, section: Section) -> tuple[Signal, Ints]:

@@ -6,7 +6,9 @@ Blanks are the bytes up to 0x20.
 from __future__ import annotations
 
 from mcz.kernels import eight_bytes, kernel, put_eight_bytes, trailing_zeros
-from mcz.kernels.types import Bytes, Ints, Ints2
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
+from mcz.model.numbers.kernels import length, put
+from mcz.model.numbers.print_kernels import put_value
 from mcz.sources.text import BLANKS, FREE, MARKUP, WORDS, Items
 
 BLANK, QUOTE, COMMA, SEMICOLON, LESS = 0x20, 0x22, 0x2C, 0x3B, 0x3C
@@ -221,3 +223,38 @@ def fill_rows(out: Bytes, at: int, items: Items, texts: Bytes, start: Ints2, siz
                 out[at : at + pad] = BLANK
                 at += pad
     return at
+
+
+@kernel
+def print_rows(
+    values: Floats2,
+    numbers: Ints,
+    rules: Ints2,
+    tens: Floats,
+    powers: Floats,
+    items: Items,
+    out: Bytes,
+) -> tuple[int, int]:
+    """Write rows of one pattern without padded columns to ``out``; returns rows and bytes written.
+
+    ``rules``, ``tens`` and ``powers`` are those of ``print_kernels.fill``; ``numbers`` are the
+    frame numbers. Stops at a row with a value that ``fill`` skips. Gaps and ``out`` have ``SPARE``
+    bytes more than are read or written.
+    """
+    gaps, gap_start, gap_stop, columns, _ = items
+    at = 0
+    for row in range(len(values)):
+        first = at
+        for k in range(len(columns)):
+            at = _copy(gaps, gap_start[k], gap_stop[k] - gap_start[k], out, at)
+            if columns[k] < 0:
+                number = abs(numbers[row])
+                at = put(numbers[row] < 0, number, length(number), 0, (0, -99, 99, 0), out, at)
+                continue
+            end = put_value(values[row, columns[k]], rules[columns[k]], tens, powers, out, at)
+            if end < 0:
+                return row, first
+            at = end
+        tail = len(columns)
+        at = _copy(gaps, gap_start[tail], gap_stop[tail] - gap_start[tail], out, at)
+    return len(values), at
