@@ -19,6 +19,7 @@ from mcz.model.types import Floats, Ints
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
 
+CLEARLY_LARGER = 1.25  # than ``TARGET_BYTES``
 TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
 SEGMENT_FRAMES = 4096  # by default
 
@@ -73,6 +74,18 @@ class Lengths:
         shorter = max(self.unit, length // 2 // self.unit * self.unit)
         return shorter if self.least <= shorter < length else length
 
+    def fit(self, length: int, n_frames: int, n_bytes: int) -> int:
+        """Halve ``length`` while a segment is too large, of which ``n_frames`` take ``n_bytes``."""
+        most = TARGET_BYTES
+        while n_bytes * min(length, n_frames) > most * n_frames:
+            shorter = self.halve(length)
+            if shorter == length:
+                break
+            length = shorter
+            if length < n_frames:  # bytes that are not known yet may be fewer
+                most = CLEARLY_LARGER * TARGET_BYTES
+        return length
+
 
 def segments_by_halving(
     n_frames: int, lengths: Lengths, code: Code, breaks: Sequence[int] = ()
@@ -85,8 +98,8 @@ def segments_by_halving(
     while first < n_frames:
         stop = min(first + length, *(end for end in (*breaks, n_frames) if end > first))
         streams = code(first, stop)
-        shorter = lengths.halve(length)
-        if not lengths.fixed and shorter < length and _size(streams) > TARGET_BYTES:
+        shorter = length if lengths.fixed else lengths.fit(length, stop - first, _size(streams))
+        if shorter < stop - first:
             length = shorter
             continue
         yield first, stop, streams
