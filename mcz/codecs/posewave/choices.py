@@ -71,8 +71,11 @@ SPREAD_CM = 2.0  # a step of this size equals the spread of a plain channel
 SAMPLED_FRAMES = 128  # for measuring it
 FINE_CM = 0.08  # below this step first poses are coded more precisely
 SPATIAL = (*ROTATION_KINDS, *POSITION_KINDS)
-LEVELS = ((0.06, (2, 3, 4, 5)), (0.2, (3, 4, 5, 6)), (math.inf, (4, 5, 6, 7)))  # tried below a step
-TRIAL_FRAMES = 2048
+LEVELS = (  # step below which they are tried, levels, frames for it
+    (0.06, (2, 3, 4, 5), 1024),
+    (0.2, (3, 4, 5, 6), 1024),
+    (math.inf, (4, 5, 6, 7), 2048),
+)
 PLAIN_TRIALS_CM = 0.2  # steps below which levels are tried with plain quantization
 SAMPLE_DISTANCE = 8  # frames between measured ones in a trial
 EXCHANGE = 0.75  # fall of bytes per rise of errors, in logarithms, for comparing trials
@@ -304,8 +307,8 @@ def best_levels(
 ) -> int:
     """Number of levels with the best rate-distortion over the start of the clip."""
     layout = source.layout
-    n_frames = min(TRIAL_FRAMES, layout.n_frames, layout.most_frames)
-    tried = next(levels for step, levels in LEVELS if step_cm < step)
+    tried, most_frames = next(row[1:] for row in LEVELS if step_cm < row[0])
+    n_frames = min(most_frames, layout.n_frames, layout.most_frames)
     if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(tried):
         return min(tried)
     values = FrameReader(NAME, source).next(n_frames)
@@ -385,16 +388,19 @@ def choose_orders(source: SignalSource, exact: Container[int] = ()) -> dict[int,
     columns = np.array([columns_by_axis(skeleton, index) for index in joints])
     scores, highest, n_rows = np.zeros((1 + N_ORDERS, len(joints))), np.zeros(len(joints)), 0
     roots = [skeleton.joints[joint].parent < 0 for joint in joints]
+    orders = [
+        Orders(dict.fromkeys(joints, code) if code != SOURCE_ORDER else {}, skeleton)
+        for code in range(1 + N_ORDERS)
+    ]
     for values in _runs(source):
         n_rows += len(values)
         highest = np.maximum(highest, np.abs(values[:, columns]).max(axis=(0, 2), initial=0.0))
         values = np.clip(values, -GREATEST, GREATEST)
-        for code in range(1 + N_ORDERS):
-            codes = dict.fromkeys(joints, code) if code != SOURCE_ORDER else {}
-            coded = Orders(codes, skeleton).to_coded_order(values)[:, columns]
+        for code, order in enumerate(orders):
+            coded = order.to_coded_order(values)[:, columns]
             scores[code] += np.sqrt(np.abs(np.diff(coded, 2, axis=0))).sum(axis=(0, 2))
     scores[VECTOR_CODE] = np.where(roots, math.inf, VECTOR_SHARE * scores[VECTOR_CODE])
-    full = Orders({}, skeleton).full
+    full = orders[SOURCE_ORDER].full
     moves = (scores[SOURCE_ORDER] > np.sqrt(STILL * full) * n_rows) & (highest < GREATEST)
     worth = moves & (scores.min(axis=0) < DUE * scores[SOURCE_ORDER])
     best = np.where(worth, scores.argmin(axis=0), SOURCE_ORDER).tolist()
