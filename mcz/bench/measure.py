@@ -13,7 +13,7 @@ from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Request, Segment, Span, model_finder
 from mcz.container.limits import BASE
 from mcz.files.reading.sizes import clip_ratios, clip_sizes
-from mcz.files.writing.clip_writer import file_in_memory
+from mcz.files.writing.clip_writer import write_trial
 from mcz.files.writing.planning import prepare
 from mcz.files.writing.signal_source import MemorySource
 from mcz.kinematics import SHELL_CM
@@ -37,7 +37,7 @@ def coded_part(motion: Motion, codec: str) -> Motion:
 def write_file(motion: Motion, codec: str, params: Params) -> bytes:
     """An MCZ file of one clip, without its quality record, which is not part of the codec."""
     chosen = codec_by_name(codec)
-    return file_in_memory(prepare(motion, chosen, params), chosen, params, BASE)
+    return write_trial(prepare(motion, chosen, params), chosen, params, BASE).data
 
 
 def coded_bytes(case: Case, variant: Variant, params: Params) -> int:

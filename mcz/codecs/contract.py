@@ -289,7 +289,8 @@ class Codec:
     re-encodes some groups in all segments (None: unsupported). ``preview`` returns the frames that
     the coarsest resolution decodes exactly (None: none). ``earlier`` has the ``decode`` of each
     earlier version. ``hash_optional``: readers may skip the comparison of the value hash.
-    ``by_rows``: the first rows of a segment take less time than all.
+    ``by_rows``: the first rows of a segment take less time than all. ``memory`` makes the parameter
+    of that name, by which an encoder that a search calls repeatedly saves work (None: it does not).
     """
 
     id: int
@@ -308,6 +309,7 @@ class Codec:
     recode: Recode | None = None
     preview: Preview | None = None
     partition: Partition | None = None
+    memory: Callable[[], object] | None = None
     exact: Exact | None = None
     positions: bool = False
     uses: Uses | None = None

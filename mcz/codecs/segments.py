@@ -76,7 +76,7 @@ class Lengths:
 
     def fit(self, length: int, n_frames: int, n_bytes: int) -> int:
         """Halve ``length`` while a segment is too large, of which ``n_frames`` take ``n_bytes``."""
-        most = TARGET_BYTES
+        most = float(TARGET_BYTES)
         while n_bytes * min(length, n_frames) > most * n_frames:
             shorter = self.halve(length)
             if shorter == length:

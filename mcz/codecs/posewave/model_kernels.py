@@ -49,9 +49,9 @@ from mcz.codecs.posewave.prediction_kernels import (
     spread,
     take_in,
 )
-from mcz.codecs.posewave.search_kernels import choose_row
+from mcz.codecs.posewave.search_kernels import choose_row, is_live
 from mcz.kernels import kernel
-from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
+from mcz.kernels.types import Bytes, Flags, Floats, Floats2, Ints, Ints2
 
 
 @kernel
@@ -68,6 +68,7 @@ def code_rows(
     last: int,
     lam: float,
     exponents: Ints,
+    is_kept: Flags,
     refining: int,
     dependent: int,
 ) -> int:
@@ -78,14 +79,17 @@ def code_rows(
     magnitudes and values of this level's rows, all of it written here but the three rows of zeros
     in front; ``parent`` and ``grand`` those of the two coarser levels, without their rows of zeros,
     or one row of zeros. ``exponents`` (rows,) say how much finer than the level's the step of a row
-    is, 2^-s; they are coded where ``refining`` is 1, and otherwise 0. ``dependent``: 1 where each
-    integer decides among which numbers the next value is.
+    is, 2^-s; they are coded where ``refining`` is 1, and otherwise 0. Rows that are ``is_kept``
+    (rows,) an encoder does not choose: ``q`` has them. ``dependent``: 1 where each integer decides
+    among which numbers the next value is.
     """
     coder, chooses = model.coder, model.coder[mixing.ENCODING] != 0
     for row in range(first, last):
         flags = flag_contexts(model, here, parent, level, row)
         exponent, live = exponents[row], 0
-        if chooses:
+        if is_kept[row]:
+            live = 1 if is_live(q[row]) else 0
+        elif chooses:
             live = choose_row(
                 model,
                 q[row],
@@ -108,7 +112,7 @@ def code_rows(
         if refining:
             earlier = exponents[row - 1] if row > 0 else 0
             exponents[row] = code_exponent(coder, data, exponent, earlier)
-        if not chooses:
+        if not chooses or is_kept[row]:
             gather_magnitudes(model, here, parent, grand, level, row)
             predict_in_time(model, here, parent, level, row)
         if code_row(model, data, q[row], here[row + 3], level, exponents[row], dependent) != 0:

@@ -46,6 +46,7 @@ from mcz.codecs.posewave.exact_channels import (
     partition,
 )
 from mcz.codecs.posewave.header import NAME, Header, parse_posewave_header
+from mcz.codecs.posewave.memory import Memory, trial_of
 from mcz.codecs.posewave.model_state import MAX_EXPONENT
 from mcz.codecs.posewave.segment import SegmentChain, decode_segment, encode_segment
 from mcz.codecs.segments import (
@@ -188,6 +189,7 @@ def _segments(
     lengths = Lengths(length, bool(requested), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
     octaves, tracker, lossy = params["refinement"], choice.tracker, _lossy(header, layout)
+    memory: Memory = (not tracker and params["memory"]) or Memory()
 
     def code(first: int, stop: int) -> tuple[bytes, ...]:
         own = None if octaves is None else octaves[first:stop]
@@ -203,8 +205,15 @@ def _segments(
         if lossy:
             if tracker:
                 tracker.first = first
-            with np.errstate(over="ignore"):  # of values that are refused in the end
-                levels = encode_segment(header, skeleton, values, choice.weights, own, tracker)[0]
+            trial = trial_of(choice.header, first, stop, own)
+            levels = memory.streams.get(trial, ())
+            if not levels:
+                rows = None if own is None else memory.rows(header, trial)
+                with np.errstate(over="ignore"):  # of values that are refused in the end
+                    levels, _ = encode_segment(
+                        header, skeleton, values, choice.weights, own, tracker, rows
+                    )
+                memory.streams[trial] = levels
             streams |= {(level, lossy[0]): stream for level, stream in enumerate(levels)}
         places = itertools.product(range(header.levels + 1), range(len(layout.groups)))
         return tuple(streams.get(place, b"") for place in places)
@@ -344,6 +353,7 @@ CODEC = Codec(
     promise=promise,
     cut=cut_header,
     partition=partition,
+    memory=Memory,
     exact=exact_groups,
     live=LiveEncoder,
     follow=LiveDecoder,
@@ -396,6 +406,7 @@ CODEC = Codec(
         Parameter("weights", None, "weight of each joint", np.asarray, inner=True),
         Parameter("like", None, "a header whose levels and orders are kept", bytes, inner=True),
         Parameter("limits", None, "bound of each channel", np.asarray, inner=True),
+        Parameter("memory", None, "of earlier trials", lambda memory: memory, inner=True),
         Parameter("refinement", None, "octaves of each frame", np.asarray, inner=True),
         SEGMENT_FRAMES_PARAMETER,
     ),

@@ -75,6 +75,31 @@ def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: s
         raise FormatError("a first value exceeds 40 bits", where=where)
 
 
+class RowMemory:
+    """The rows of a segment as they were coded last, for an encode that differs in few of them.
+
+    Only the steps of some rows may differ: all others keep their values, which takes less time than
+    choosing them, and lets errors elsewhere be as they were.
+    """
+
+    def __init__(self) -> None:
+        self._levels: dict[int, tuple[Ints, Ints]] = {}  # exponents and doubles
+
+    def recall(self, level: int, rows: RowCoder) -> None:
+        """Let ``rows`` keep values of the last encode, before a level is coded."""
+        if level not in self._levels:
+            return
+        exponents, doubles = self._levels[level]
+        kept = exponents == rows.exponents
+        if level == 0:  # each row is a difference from what those before have come to
+            kept = np.logical_and.accumulate(kept)
+        rows.keep(kept, doubles)
+
+    def note(self, level: int, exponents: Ints, rows: RowCoder) -> None:
+        """Remember a level; ``exponents`` are those that were asked for."""
+        self._levels[level] = exponents, rows.doubles
+
+
 class RowCoder:
     """Codes the rows of one level after the other, all with one adaptive model.
 
@@ -127,7 +152,18 @@ class RowCoder:
         self._doubles = np.zeros((n_known + n_rows, self.n_kept), np.int64)
         self._wanted = np.zeros(self._doubles.shape)
         self._exponents = np.zeros(n_known + n_rows, np.int64)
+        self._is_kept = np.zeros(n_known + n_rows, np.bool_)
         self.exponents = self._exponents[n_known:]
+
+    @property
+    def doubles(self) -> Ints:
+        """Twice the values of the rows of the stream, (n_rows, n_kept), in steps."""
+        return self._doubles[self._n_known :]
+
+    def keep(self, kept: Bools, doubles: Ints) -> None:
+        """Let an encoder take these values of the rows that are ``kept`` (n_rows,)."""
+        self._is_kept[self._n_known :] = kept
+        self.doubles[kept] = doubles[kept]
 
     def encode(self, rate_weight: float, first: int, rows: Floats) -> Floats:
         """Rows of coefficients, in steps, as a decoder will have them."""
@@ -167,6 +203,7 @@ class RowCoder:
             stop,
             rate_weight,
             self._exponents,
+            self._is_kept,
             1 if self.refining else 0,
             1 if self.dependent else 0,
         )

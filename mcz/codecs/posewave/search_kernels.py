@@ -72,12 +72,17 @@ def choose_row(
     gather_magnitudes(model, here, parent, grand, level, row)
     predict_in_time(model, here, parent, level, row)
     cost = search_row(model, q, y, level, lam, float(1 << exponent), dependent)
-    live = 0
-    for c in range(len(q)):
-        live |= 1 if q[c] != 0 else 0
     chance = mixed_chance(model.coder, M_FLAG + level, flags)
     saved = model.costs[chance >> 4] - model.costs[(65536 - chance) >> 4]
-    return live if cost + lam * float(saved) / COST_UNIT < energy else 0
+    return 1 if cost + lam * float(saved) / COST_UNIT < energy and is_live(q) else 0
+
+
+def is_live(q: Ints) -> bool:
+    """Return True for a row with a value other than 0."""
+    for c in range(len(q)):
+        if q[c] != 0:
+            return True
+    return False
 
 
 def search_row(

@@ -17,7 +17,7 @@ from mcz.codecs.posewave.contacts import ContactTracker, decode_contacts, room_o
 from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.level_coder import LevelCoder, Pyramid
 from mcz.codecs.posewave.orders import Orders
-from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
+from mcz.codecs.posewave.row_coder import RowCoder, RowMemory, Stream, code_head, fresh_coder
 from mcz.codecs.transforms import lifting
 from mcz.errors import FormatError, MotionError
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, ROTATION_KINDS, Skeleton
@@ -62,16 +62,17 @@ def encode_segment(
     weights: Weights,
     refinement: Ints | None = None,
     contacts: ContactTracker | None = None,
+    memory: RowMemory | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
     """Encode a segment of unwrapped ``values``; return its streams and the decoded values.
 
     Both are (n_frames, n_channels). ``refinement`` (n_frames,) requests steps of 2^-r of the usual
-    ones for rows that affect these frames, ``contacts`` are held. Results for exact channels are
-    undefined. Raises MotionError for values that are too large.
+    ones for rows that affect these frames, ``contacts`` are held, ``memory`` is of earlier encodes.
+    Results for exact channels are undefined. Raises MotionError for values that are too large.
     """
     orders = Orders(header.orders, skeleton)
     coded = orders.to_coded_order(values)
-    streams, decoded = encode_coded(header, skeleton, coded, weights, refinement, contacts)
+    streams, decoded = encode_coded(header, skeleton, coded, weights, refinement, contacts, memory)
     notes, decoded = orders.notes_and_values(values, decoded)
     return (notes + streams[0], *streams[1:]), decoded
 
@@ -83,6 +84,7 @@ def encode_coded(
     weights: Weights,
     refinement: Ints | None = None,
     contacts: ContactTracker | None = None,
+    memory: RowMemory | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
     """Encode a segment of ``values`` whose angles are in the orders of the header."""
     pyramid = Pyramid(len(values), header.levels, header.borrowing)
@@ -106,9 +108,14 @@ def encode_coded(
             moving = head.moving.astype(np.int64)
             code_head(stream, kinds_of(skeleton, header.whole), moving, head.numbers.copy(), NAME)
         rows.begin(level, pyramid.kind(level), len(band), stream)
-        rows.exponents[:] = pyramid.exponents(level, refinement)
+        exponents = pyramid.exponents(level, refinement)
+        rows.exponents[:] = exponents
+        if memory:
+            memory.recall(level, rows)
         code = partial(rows.encode, weights.of(level))
         (levels.code_details if level else levels.code_coarsest)(level, code, band, rows.exponents)
+        if memory:
+            memory.note(level, exponents, rows)
         if level < pyramid.n_details:
             streams.append(stream.finish())
     decoded = levels.values()

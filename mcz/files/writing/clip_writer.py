@@ -186,13 +186,26 @@ def write_clip(
     return write_plan(writer, plan_clip(Prepared(motion), codec, params, writer.profile))
 
 
-def file_in_memory(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> bytes:
-    """A file of one clip without its quality record."""
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A file of one clip in memory, without its quality record.
+
+    ``header`` is that of the motion's codec, ``values`` (by signal) are as a reader has them.
+    """
+
+    data: bytes
+    header: bytes
+    values: tuple[Values, ...]
+
+
+def write_trial(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> Trial:
     out = io.BytesIO()
     writer = Writer(out, profile=profile)
-    write_plan(writer, plan_clip(prepared, codec, params, profile), quality=False)
+    plan = plan_clip(prepared, codec, params, profile)
+    decoded = _write_clip(writer, plan, None)
     writer.finish()
-    return out.getvalue()
+    values = tuple(signal.values for signal in decoded)
+    return Trial(out.getvalue(), plan.signals[0].encoded.header, values)
 
 
 def write_plan(
@@ -200,19 +213,30 @@ def write_plan(
     plan: ClipPlan,
     progress: Progress | None = None,
     *,
-    quality: bool = True,
     remarks: Mapping[str, str] = MappingProxyType({}),
     amend: Amend | None = None,
-    copy: ClipCopy | None = None,
 ) -> dict[str, str] | None:
     """Write one clip: its skeletons and template if new, CLIP, segments, CEND, quality if lossy.
 
     Returns the quality record, None if there is none. ``remarks`` are added to it, ``amend`` edits
-    it last. ``copy`` decodes the clip before it ends.
+    it last.
     """
     motion, codec = plan.motion, plan.codec
+    decoded = _write_clip(writer, plan, progress)
+    if codec.lossless:
+        return None
+    settings, values = codec.settings(plan.options), [signal.values for signal in decoded]
+    named = quality_record(motion, values, codec.name, settings, remarks)
+    stored = with_indices(named, motion.skeleton)
+    stored = amend(stored, values) if amend else stored
+    writer.ancillary(CHUNK, quality_payload(stored))
+    return with_names(stored, motion.skeleton)
+
+
+def _write_clip(writer: Writer, plan: ClipPlan, progress: Progress | None) -> list[Decoded]:
+    """Write one clip up to CEND; return its signals as decoded from a copy."""
+    motion, copy = plan.motion, ClipCopy(writer.profile)
     record = _write_references(writer, plan)
-    copy = copy or ClipCopy(writer.profile)
     for model in plan.models:
         copy.writer.shared(ChunkType.MODL, model)
     for each in (writer, copy.writer):
@@ -222,14 +246,7 @@ def write_plan(
     decoded = copy.decoded(motion, plan.signals)
     sha256 = motion.source.sha256 if motion.source else b""
     writer.end_clip(motion.n_frames, sha256, [signal.sha256 for signal in decoded])
-    if not quality or codec.lossless:
-        return None
-    settings, values = codec.settings(plan.options), [signal.values for signal in decoded]
-    named = quality_record(motion, values, codec.name, settings, remarks)
-    stored = with_indices(named, motion.skeleton)
-    stored = amend(stored, values) if amend else stored
-    writer.ancillary(CHUNK, quality_payload(stored))
-    return with_names(stored, motion.skeleton)
+    return decoded
 
 
 def begin_open_clip(writer: Writer, plan: ClipPlan, first_number: int = 1) -> None:

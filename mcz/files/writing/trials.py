@@ -1,4 +1,4 @@
-"""Trials of parameters: the clip is written to memory, and measured by the public reader.
+"""Trials of parameters: the clip is written to memory, and what a reader decodes is measured.
 
 ``meet_bound`` meets a greatest error by finer steps in frames that miss it, ``weigh_joints`` the
 mean errors of joints by a weight for each.
@@ -22,8 +22,9 @@ from mcz.container.source import open_source
 from mcz.errors import ContactWarning, MotionError, OptionError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.sizes import clip_sizes
-from mcz.files.writing.clip_writer import file_in_memory
+from mcz.files.writing.clip_writer import Trial, write_trial
 from mcz.files.writing.planning import Prepared
+from mcz.files.writing.quality import with_values
 from mcz.files.writing.signal_bounds import MEAN_ERROR
 from mcz.kinematics import positions_of
 from mcz.kinematics.joint_groups import find_joints
@@ -46,7 +47,7 @@ COMMON = 0.9  # share of the frames whose error, in bounds, should be within a r
 LEAST_COMMON, WANTED_COMMON, MOST_COMMON = 0.55, 0.75, 1.1
 MARGIN = 0.3  # octaves added to the miss of a frame
 Limits = Sequence[tuple[str, float]]  # a joint or a group of joints, and its limit in cm
-QUALITY, WEIGHTS, LIKE = "quality", "weights", "like"
+QUALITY, WEIGHTS, LIKE, MEMORY = "quality", "weights", "like", "memory"
 MOST_WEIGHINGS = 8
 OVERCORRECTION = 1.15  # growth of a weight relative to the square of the miss
 MOST_WEIGHT = 2.0**24
@@ -73,7 +74,8 @@ class Trials:
         self.motion, self.codec, self.params, self.profile = motion, codec, params, profile
         self.alone = replace(motion, signals=motion.signals[:1])
         self.others = 0.0  # bytes of the further signals, which no dial changes
-        self.kept: JsonObject = {}  # choices of the first trial, for all
+        # Choices of the first trial, for all, and what they need not repeat.
+        self.kept: JsonObject = {MEMORY: codec.memory()} if codec.memory else {}
 
     def with_params(self, more: Params) -> Trials:
         """Trials with more parameters, and earlier choices."""
@@ -99,8 +101,7 @@ class Trials:
 
         Of positions in cm, unless ``target`` is one of channels.
         """
-        clip = self._write_trial(self.alone, params)[1]
-        unit, decoded = self.motion.skeleton.unit_cm, clip.motion()
+        unit, decoded = self.motion.skeleton.unit_cm, self._decoded(self.alone, params)
         if target.weights is not None:
             errors = self._weighed_errors(target.weights, decoded)
             known = np.where(np.isfinite(errors), errors, 0.0).reshape(self.motion.n_frames, -1)
@@ -122,7 +123,7 @@ class Trials:
 
         0 for one without points.
         """
-        decoded = self._write_trial(self.alone, params)[1].motion()
+        decoded = self._decoded(self.alone, params)
         figures = compare(self.alone, decoded, virtual_markers=False, shell_cm=None).by_joint
         unit = self.motion.skeleton.unit_cm
         return np.array([(figure.mean_position_error or 0.0) * (unit or 0.0) for figure in figures])
@@ -139,33 +140,43 @@ class Trials:
             )
         return errors
 
-    def _write_trial(self, motion: Motion, trial_params: Params) -> tuple[Container, Clip]:
+    def _write_trial(self, motion: Motion, trial_params: Params) -> Trial:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ContactWarning)  # only the clip's own warnings count
             params = {**self.params, **self.kept, **trial_params}
-            data = file_in_memory(Prepared(motion), self.codec, params, self.profile)
-        container = Container(open_source(data), max_decoded=2**53)
-        clip = Clip(container, container.directory.clips[motion.name])
+            trial = write_trial(Prepared(motion), self.codec, params, self.profile)
         if self.codec.has(LIKE):
-            self.kept.setdefault(LIKE, clip.signals[0].header)
-        return container, clip
+            self.kept.setdefault(LIKE, trial.header)
+        return trial
+
+    def _decoded(self, motion: Motion, params: Params) -> Motion:
+        """``motion`` as a reader has it."""
+        trial = self._write_trial(motion, params)
+        if any(signal.scaling is not None for signal in motion.signals):  # of stored numbers
+            return _open(trial, motion)[1].motion()
+        return replace(motion, signals=tuple(map(with_values, motion.signals, trial.values)))
 
     def _measure(self, motion: Motion, target: Target, params: Params) -> float:
-        container, clip = self._write_trial(motion, params)
         if target.weights is not None:
-            errors = self._weighed_errors(target.weights, clip.motion())
+            errors = self._weighed_errors(target.weights, self._decoded(motion, params))
             n = np.isfinite(errors).sum(axis=0) if target.name == MEAN_ERROR else 1
             known = np.where(np.isfinite(errors), errors, 0.0)
             sums = known.sum(axis=0) / np.maximum(n, 1)
             return float((sums if target.name == MEAN_ERROR else known).max(initial=0.0))
         if not target.falls:
-            figures = compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)
+            decoded = self._decoded(motion, params)
+            figures = compare(motion, decoded, virtual_markers=False, shell_cm=None)
             return _error(target, figures)
-        sizes = clip_sizes(container, clip)
+        sizes = clip_sizes(*_open(self._write_trial(motion, params), motion))
         if target.name == "target_bytes":
             return float(sizes.payload + sizes.overhead + sizes.models)
         assert motion.frame_rate is not None
         return float(sizes.payload * 8 * motion.frame_rate / motion.n_frames / 1000)
+
+
+def _open(trial: Trial, motion: Motion) -> tuple[Container, Clip]:
+    container = Container(open_source(trial.data), max_decoded=2**53)
+    return container, Clip(container, container.directory.clips[motion.name])
 
 
 def _error(target: Target, comparison: Comparison) -> float:

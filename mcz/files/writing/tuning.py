@@ -1,6 +1,6 @@
 """Sizes and errors as targets: the dial of a codec is searched until they are verified.
 
-Every trial is a file in memory that the public reader opens and measures.
+Every trial is a file in memory; what a reader decodes of it is measured.
 """
 
 from __future__ import annotations

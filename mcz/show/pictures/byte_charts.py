@@ -17,7 +17,7 @@ from mcz.errors import MczError, OptionError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import open
 from mcz.files.reading.sizes import by_group, byte_shares, clip_sizes
-from mcz.files.writing.clip_writer import file_in_memory
+from mcz.files.writing.clip_writer import write_trial
 from mcz.files.writing.planning import prepare
 from mcz.kinematics.metrics import Comparison, compare
 from mcz.kinematics.metrics.sums import scale_figure
@@ -209,7 +209,7 @@ def _try_setting(motion: Motion, codec: Codec, setting: float) -> tuple[int, Com
     assert codec.dial is not None
     alone = replace(motion, signals=motion.signals[:1], source=None, metadata={})
     params = {codec.dial.parameter: setting}
-    data = file_in_memory(prepare(alone, codec, params), codec, params, BASE)
+    data = write_trial(prepare(alone, codec, params), codec, params, BASE).data
     with open(data, max_decoded=2**53) as file:
         clip = file.only_clip()
         sizes = clip_sizes(file.container, clip)

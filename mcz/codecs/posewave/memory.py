@@ -1,0 +1,46 @@
+"""Segments of a clip that a search for a target has already encoded.
+
+A search encodes one clip again and again; what it asks for twice is not encoded twice, above all
+the result. Where only steps of some rows differ, the other rows keep their values, see
+``RowMemory``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from mcz.codecs.posewave.header import Header
+from mcz.codecs.posewave.row_coder import RowMemory
+from mcz.model.types import Ints
+
+Streams = tuple[bytes, ...]
+
+
+class Trial(NamedTuple):
+    """All by which encodes of one segment of a clip differ: ``octaves`` of its frames, too."""
+
+    header: bytes
+    first: int
+    stop: int
+    octaves: bytes
+
+
+def trial_of(header: bytes, first: int, stop: int, refinement: Ints | None) -> Trial:
+    octaves = b"" if refinement is None else refinement.astype("u1").tobytes()
+    return Trial(header, first, stop, octaves)
+
+
+class Memory:
+    """The streams of all trials, and the rows of the last step that was tried."""
+
+    def __init__(self) -> None:
+        self.streams: dict[Trial, Streams] = {}
+        self._settings: tuple[object, ...] = ()
+        self._rows: dict[tuple[int, int], RowMemory] = {}
+
+    def rows(self, header: Header, trial: Trial) -> RowMemory:
+        """The rows of a segment; new ones where more than steps of rows differs from earlier."""
+        settings = header.step, header.levels, header.weights.tobytes()
+        if settings != self._settings:
+            self._settings, self._rows = settings, {}
+        return self._rows.setdefault((trial.first, trial.stop), RowMemory())
