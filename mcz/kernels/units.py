@@ -47,6 +47,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.posewave.order_kernels",
     ),
     "rows": (
+        "mcz.codecs.posewave.course_kernels",
         "mcz.codecs.posewave.displacement_kernels",
         "mcz.codecs.posewave.head_kernels",
         "mcz.codecs.posewave.model_kernels",

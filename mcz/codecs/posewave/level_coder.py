@@ -16,12 +16,14 @@ import numpy as np
 
 from mcz.codecs.posewave.contact_plan import Contacts, HeldPoints, make_held_points
 from mcz.codecs.posewave.header import Header
-from mcz.codecs.posewave.skeleton_plan import bounded_regularization, make_plan
+from mcz.codecs.posewave.skeleton_plan import Plan, bounded_regularization, make_plan
 from mcz.codecs.transforms import lifting
 from mcz.model.motion import Skeleton
 from mcz.model.types import Bools, Floats, Ints
 
-Code = Callable[[int, Floats], Floats]  # (first row, rows to code) -> rows as a decoder has them
+Code = Callable[[Floats], Floats]  # rows to code -> rows as a decoder has them
+CourseMetric = tuple[Plan, Any, Any]  # also ``Lanes`` and ``Course`` of kernels
+CodeCourse = Callable[[CourseMetric, Floats, Floats, Floats], None]  # rows, their steps, the result
 
 BLOCK_ENTRIES = 2**21  # numbers of factors that are in memory at a time
 
@@ -83,16 +85,11 @@ class LevelCoder:
         halved: Floats = np.ldexp(1.0, -exponents).astype(np.float64)
         return self.header.step / self.pyramid.root(level) * halved[:, None]
 
-    def code_coarsest(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
-        """Encode level 0, a row at a time; ``code`` returns the decoded row."""
-        course, steps = self.course, self.steps(level, exponents)
-        factor = self.metric.empty()
+    def code_coarsest(self, level: int, code: CodeCourse, rows: Floats, exponents: Ints) -> None:
+        """Encode level 0, one row after the other."""
         self.approx = np.empty((len(rows), len(self.kept)))
-        for m, row in enumerate(rows):
-            kernels().next_factor(self.metric.plan, self.lanes, course, factor)
-            coefficients = self.metric.to_metric(factor, (row - course.expected)[None]) / steps[m]
-            kernels().take_row(self.metric.plan, course, factor, code(m, coefficients) * steps[m])
-            self.approx[m] = course.pose[0, self.kept]
+        steps = self.steps(level, exponents)[:, 0]
+        code((self.metric.plan, self.lanes, self.course), rows, steps, self.approx)
 
     def take_coarsest(self, level: int, rows: Floats, exponents: Ints) -> None:
         """Level 0 from all of its rows in the metric, in steps."""
@@ -106,7 +103,7 @@ class LevelCoder:
         coefficients = self._map_rows(self.metric.to_metric, which, rows) / self.steps(
             level, exponents
         )
-        self._add(level, which, code(0, coefficients), exponents)
+        self._add(level, which, code(coefficients), exponents)
 
     def take_details(self, level: int, rows: Floats, exponents: Ints) -> None:
         """A level of details from its rows in the metric, in steps."""
@@ -226,10 +223,6 @@ class Metric:
         values[:, self.kept] = poses
         result: Floats = kernels().factor(self.plan, values)
         return result
-
-    def empty(self) -> Floats:
-        """Room for the factor of a single pose."""
-        return np.empty((1, self.plan.n_entries))
 
     def to_metric(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """Differences of values, (n_rows, n_kept), in the metric, each at the pose ``which``."""

@@ -286,20 +286,6 @@ def continue_course(course: Course, difference: Floats) -> None:
 
 
 @kernel
-def next_factor(plan: Plan, lanes: Lanes, course: Course, factor: Floats2) -> None:
-    """Fill ``factor`` (1, n_entries) at the last pose."""
-    factor_rows(plan, lanes, course.pose, factor, 1, 1)
-
-
-@kernel
-def take_row(plan: Plan, course: Course, factor: Floats2, row: Floats2) -> None:
-    """Go on by a row (1, n_kept) that is in the metric."""
-    difference = np.empty(len(course.kept))
-    row_out_of(plan, factor[0], row[0], difference)
-    continue_course(course, difference)
-
-
-@kernel
 def take_rows(plan: Plan, lanes: Lanes, course: Course, rows: Floats2, approx: Floats2) -> None:
     """The approximations, (n_rows, n_kept), of rows in the metric."""
     n_kept = len(course.kept)
@@ -342,13 +328,16 @@ def rows_into(plan: Plan, factors: Floats2, rows: Floats2, result: Floats2, whic
     ``factors`` (n_poses, n_entries).
     """
     for n in range(len(rows)):
-        factor, row = factors[which[n]], rows[n]
-        for c in range(len(plan.joints)):
-            last = plan.starts[c + 1] - 1
-            total = row[c]
-            for at in range(plan.starts[c], last):
-                total += factor[at] * row[plan.path[at]]
-            result[n, c] = total / factor[last]
+        row_into(plan, factors[which[n]], rows[n], result[n])
+
+
+def row_into(plan: Plan, factor: Floats, row: Floats, result: Floats) -> None:
+    for c in range(len(plan.joints)):
+        last = plan.starts[c + 1] - 1
+        total = row[c]
+        for at in range(plan.starts[c], last):
+            total += factor[at] * row[plan.path[at]]
+        result[c] = total / factor[last]
 
 
 @kernel

@@ -33,6 +33,7 @@ from mcz.codecs.posewave.model_state import (
     SCALED,
     SIDE_1,
     USUAL,
+    LevelRows,
     Model,
 )
 from mcz.codecs.posewave.prediction_kernels import (
@@ -51,38 +52,29 @@ from mcz.codecs.posewave.prediction_kernels import (
 )
 from mcz.codecs.posewave.search_kernels import choose_row, is_live
 from mcz.kernels import kernel
-from mcz.kernels.types import Bytes, Flags, Floats, Floats2, Ints, Ints2
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints
 
 
 @kernel
 def code_rows(
     model: Model,
     data: Bytes,
-    q: Ints2,
-    y: Floats2,
-    here: Floats2,
-    parent: Floats2,
-    grand: Floats2,
+    rows: LevelRows,
     level: int,
     first: int,
     last: int,
     lam: float,
-    exponents: Ints,
-    is_kept: Flags,
     refining: int,
     dependent: int,
 ) -> int:
     """Code the rows ``first`` to ``last`` of a level in place; return the row of a fault, or -1.
 
-    ``q`` (rows, n) are twice the values, in steps; ``y`` (rows, n) is what an encoder quantizes,
-    with ``lam``, as so many squares of a step as a bit is worth. ``here`` (3 + rows, 2 wide) are
-    magnitudes and values of this level's rows, all of it written here but the three rows of zeros
-    in front; ``parent`` and ``grand`` those of the two coarser levels, without their rows of zeros,
-    or one row of zeros. ``exponents`` (rows,) say how much finer than the level's the step of a row
-    is, 2^-s; they are coded where ``refining`` is 1, and otherwise 0. Rows that are ``is_kept``
-    (rows,) an encoder does not choose: ``q`` has them. ``dependent``: 1 where each integer decides
+    An encoder chooses by ``lam``, as so many squares of a step as a bit is worth. Exponents are
+    coded where ``refining`` is 1, and otherwise 0. ``dependent``: 1 where each integer decides
     among which numbers the next value is.
     """
+    q, exponents, is_kept = rows.q, rows.exponents, rows.is_kept
+    here, parent, grand = rows.here, rows.parent, rows.grand
     coder, chooses = model.coder, model.coder[mixing.ENCODING] != 0
     for row in range(first, last):
         flags = flag_contexts(model, here, parent, level, row)
@@ -93,7 +85,7 @@ def code_rows(
             live = choose_row(
                 model,
                 q[row],
-                y[row],
+                rows.y[row],
                 here,
                 parent,
                 grand,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints3
+from mcz.kernels.types import Flags, Floats, Floats2, Floats3, Ints, Ints2, Ints3
 
 N_LEVELS = 6
 MAX_INDEX = 1 << 30
@@ -84,3 +84,22 @@ class Model(NamedTuple):
     own_weights: Floats2
     features: Floats2
     sizes: Floats2
+
+
+class LevelRows(NamedTuple):
+    """The rows of a level: ``q`` (rows, n), twice the values, in steps.
+
+    ``y`` (rows, n) is what an encoder quantizes. ``here`` (3 + rows, 2 wide) are magnitudes and
+    values, all of it written by ``code_rows`` but the three rows of zeros in front; ``parent`` and
+    ``grand`` those of the two coarser levels, without their rows of zeros, or one row of zeros.
+    ``exponents`` (rows,) say how much finer than the level's the step of a row is, 2^-s. Rows that
+    are ``is_kept`` (rows,) an encoder does not choose: ``q`` has them.
+    """
+
+    q: Ints2
+    y: Floats2
+    here: Floats2
+    parent: Floats2
+    grand: Floats2
+    exponents: Ints
+    is_kept: Flags

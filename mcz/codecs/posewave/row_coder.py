@@ -8,16 +8,17 @@ from __future__ import annotations
 from copy import copy, deepcopy
 from functools import cache
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
 from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.model import Start, make_model, new_rows, no_rows, start_coder
-from mcz.codecs.posewave.model_state import N_SMALL
+from mcz.codecs.posewave.model_state import N_SMALL, LevelRows
 from mcz.errors import FormatError, MotionError
 from mcz.model.types import Bools, Floats, Ints
 
-MOST_WANTED = 2.0**29
+TOO_LARGE = f"{NAME}: a coefficient exceeds 2^29 quantizer steps"
 CARRIED = 40.0  # rows at most that the coarser levels count for
 
 
@@ -26,6 +27,13 @@ def _model() -> ModuleType:
     from mcz.codecs.posewave import model_kernels
 
     return model_kernels
+
+
+@cache
+def _course() -> ModuleType:
+    from mcz.codecs.posewave import course_kernels
+
+    return course_kernels
 
 
 @cache
@@ -107,17 +115,15 @@ class RowCoder:
     """
 
     stream: Stream
-    exponents: Ints  # (n_rows,) of the level, or of its continuation
+    _rows: LevelRows
 
     def __init__(self, header: Header, classes: Ints, kept: Bools, coder: Ints, where: str) -> None:
         known, channels = header.prior, np.flatnonzero(kept)
         self.where, self.n_kept = where, len(channels)
-        self.refining, self.dependent = header.refining, header.dependent
+        self._flags = int(header.refining), int(header.dependent)
         prior = None if known is None else known.of(channels)
         self.model = make_model(classes[channels], header.start, coder, prior)
-        nothing = no_rows(self.n_kept)
-        self.here = nothing
-        self.before = [nothing, nothing]  # the two levels of details before, the coarser one last
+        self._coarser = [no_rows(self.n_kept)] * 2  # two levels of details, the coarser one last
 
     def copy(self) -> RowCoder:
         """Return an independent copy, between two streams."""
@@ -128,10 +134,9 @@ class RowCoder:
     def begin(self, level: int, kind: int, n_rows: int, stream: Stream) -> None:
         """Begin a level; ``kind`` selects the usual size of its coefficients."""
         if level > 1:
-            self.before = [self.here[3:], self.before[0]]
+            self._coarser = [self._rows.here[3:], self._coarser[0]]
         self.kind, self.stream = kind, stream
-        self.here = new_rows(n_rows, self.n_kept)
-        self._make_room(0, n_rows)
+        self._make_room(0, new_rows(n_rows, self.n_kept))
         seen = self.model.seen
         if seen[0] > CARRIED:
             self.model.variances[:] *= CARRIED / seen[0]
@@ -139,78 +144,113 @@ class RowCoder:
 
     def go_on(self, n_rows: int, stream: Stream) -> None:
         """Continue a level in another stream."""
-        n_known = 2 - len(self._doubles) % 2  # keeps the parity of numbers of rows
-        last, known = self._exponents[-1], self.here[-3 - n_known :]
-        self.here = np.concatenate([known, new_rows(n_rows, self.n_kept)[3:]])
+        n_known = 2 - len(self._rows.q) % 2  # keeps the parity of numbers of rows
+        last, known = self._rows.exponents[-1], self._rows.here[-3 - n_known :]
         self.stream = stream
-        self._make_room(n_known, n_rows)
-        self._exponents[n_known - 1] = last
+        self._make_room(n_known, np.concatenate([known, new_rows(n_rows, self.n_kept)[3:]]))
+        self._rows.exponents[n_known - 1] = last
 
-    def _make_room(self, n_known: int, n_rows: int) -> None:
-        """Make room for new rows, after ``n_known`` ones of the stream before."""
-        self._n_known = n_known
-        self._doubles = np.zeros((n_known + n_rows, self.n_kept), np.int64)
-        self._wanted = np.zeros(self._doubles.shape)
-        self._exponents = np.zeros(n_known + n_rows, np.int64)
-        self._is_kept = np.zeros(n_known + n_rows, np.bool_)
-        self.exponents = self._exponents[n_known:]
+    def _make_room(self, n_known: int, here: Floats) -> None:
+        """Make room for new rows ``here``, after ``n_known`` ones of the stream before."""
+        self._n_known, n_rows = n_known, len(here) - 3
+        self._rows = LevelRows(
+            q=np.zeros((n_rows, self.n_kept), np.int64),
+            y=np.zeros((n_rows, self.n_kept)),
+            here=here,
+            parent=self._coarser[0],
+            grand=self._coarser[1],
+            exponents=np.zeros(n_rows, np.int64),
+            is_kept=np.zeros(n_rows, np.bool_),
+        )
+
+    @property
+    def exponents(self) -> Ints:
+        """Octaves by which steps of rows of the stream are finer, (n_rows,)."""
+        return self._rows.exponents[self._n_known :]
 
     @property
     def doubles(self) -> Ints:
-        """Twice the values of the rows of the stream, (n_rows, n_kept), in steps."""
-        return self._doubles[self._n_known :]
+        """Twice the values of these rows, (n_rows, n_kept), in steps."""
+        return self._rows.q[self._n_known :]
 
     def keep(self, kept: Bools, doubles: Ints) -> None:
         """Let an encoder take these values of the rows that are ``kept`` (n_rows,)."""
-        self._is_kept[self._n_known :] = kept
+        self._rows.is_kept[self._n_known :] = kept
         self.doubles[kept] = doubles[kept]
 
-    def encode(self, rate_weight: float, first: int, rows: Floats) -> Floats:
-        """Rows of coefficients, in steps, as a decoder will have them."""
-        first += self._n_known
-        self._wanted[first : first + len(rows)] = rows
-        if not (np.abs(rows) < MOST_WANTED).all():  # NaN too
-            raise MotionError(f"{NAME}: a coefficient exceeds 2^29 quantizer steps")
-        self._run(first, first + len(rows), rate_weight)
-        return self._decoded(first, first + len(rows))
+    def encode(self, rate_weight: float, rows: Floats) -> Floats:
+        """All rows of coefficients, in steps, as a decoder will have them."""
+        self._rows.y[self._n_known :] = rows
+        if not (np.abs(rows) < _course().MOST_WANTED).all():  # NaN too
+            raise MotionError(TOO_LARGE)
+        self._run(rate_weight)
+        return self._decoded()
+
+    def encode_course(
+        self,
+        rate_weight: float,
+        metric: tuple[Any, ...],
+        rows: Floats,
+        steps: Floats,
+        approx: Floats,
+    ) -> None:
+        """Approximations, (n_rows, n_kept), one after the other; fills ``approx`` with the decoded.
+
+        ``steps`` (n_rows,) are those of the rows.
+        """
+        if not self.n_kept:
+            return
+        fault = _course().code_course(
+            *metric,
+            rows,
+            steps,
+            approx,
+            self.model,
+            self.stream.data,
+            self._rows,
+            self.kind,
+            self._n_known,
+            rate_weight,
+            *self._flags,
+        )
+        if fault == _course().TOO_LARGE:
+            raise MotionError(TOO_LARGE)
+        self._check(fault)
 
     def decode(self, *, ends: bool = True) -> Floats:
         """All rows of the level, (n_rows, n_kept), in steps; ``ends``: the stream must end too."""
         if not self.n_kept:
             if not self.stream.is_whole:  # PWAVE-20, PWAVE-30
                 raise FormatError("rows have bytes, but no channel is kept", where=self.where)
-            return self._decoded(self._n_known, len(self._doubles))
-        self._run(self._n_known, len(self._doubles), -1.0)
+            return self._decoded()
+        self._run(-1.0)
         if ends and not self.stream.is_whole:  # ROWS-01
             raise FormatError(
                 f"rows of kind {self.kind} should not have {len(self.stream.data)} bytes",
                 where=self.where,
             )
-        return self._decoded(self._n_known, len(self._doubles))
+        return self._decoded()
 
-    def _run(self, first: int, stop: int, rate_weight: float) -> None:
+    def _run(self, rate_weight: float) -> None:
         if not self.n_kept:
             return
         fault = _model().code_rows(
             self.model,
             self.stream.data,
-            self._doubles,
-            self._wanted,
-            self.here,
-            *self.before,
+            self._rows,
             self.kind,
-            first,
-            stop,
+            self._n_known,
+            len(self._rows.q),
             rate_weight,
-            self._exponents,
-            self._is_kept,
-            1 if self.refining else 0,
-            1 if self.dependent else 0,
+            *self._flags,
         )
+        self._check(fault)
+
+    def _check(self, fault: int) -> None:
         if fault >= 0:
             raise FormatError(
                 f"row {fault} of level of kind {self.kind} is out of range", where=self.where
             )
 
-    def _decoded(self, first: int, stop: int) -> Floats:
-        return np.multiply(self._doubles[first:stop], 0.5, dtype=np.float64)
+    def _decoded(self) -> Floats:
+        return np.multiply(self.doubles, 0.5, dtype=np.float64)

@@ -112,8 +112,11 @@ def encode_coded(
         rows.exponents[:] = exponents
         if memory:
             memory.recall(level, rows)
-        code = partial(rows.encode, weights.of(level))
-        (levels.code_details if level else levels.code_coarsest)(level, code, band, rows.exponents)
+        weight = weights.of(level)
+        if level:
+            levels.code_details(level, partial(rows.encode, weight), band, rows.exponents)
+        else:
+            levels.code_coarsest(level, partial(rows.encode_course, weight), band, rows.exponents)
         if memory:
             memory.note(level, exponents, rows)
         if level < pyramid.n_details:
@@ -272,10 +275,7 @@ class SegmentChain:
             room = n_frames * (8 * rows.n_kept + 1) + 1024
             rows.go_on(n_frames, Stream(rows.model.coder, room, None))
         rows.exponents[:] = exponent
-
-        def code(first: int, coefficients: Floats) -> Floats:
-            return rows.encode(weight, first, coefficients)
-
+        code = partial(rows.encode_course, weight)
         level_coder.code_coarsest(0, code, values[:, level_coder.kept], rows.exponents)
         self._level_coder, self._rows = level_coder, rows
         return rows.stream.finish(), level_coder.values()
