@@ -6,7 +6,7 @@ mcz/codecs/posewave/README.md describes it; decoders do not need it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,14 +36,8 @@ from mcz.codecs.posewave.header import (
     parse_posewave_header,
 )
 from mcz.codecs.posewave.model import number_of
-from mcz.codecs.posewave.orders import (
-    N_NOTES,
-    N_ORDERS,
-    VECTOR_CODE,
-    Orders,
-    columns_by_axis,
-    own_sequence,
-)
+from mcz.codecs.posewave.order_choice import choose_orders
+from mcz.codecs.posewave.orders import N_NOTES, Orders
 from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
@@ -109,7 +103,7 @@ def choose(source: SignalSource, params: Params) -> Choice:
     weights = weights_of(step_cm)
     fields = _header_fields(skeleton, step, step_cm)
     limits = params.get("limits")
-    spreads = _spreads(sample(source, SAMPLED_FRAMES)) if limits is None else limits
+    spreads = _sampled_spreads(source, skeleton) if limits is None else limits
     fields |= _plain_steps(skeleton, spreads, step_cm, turning=limits is None)
     if limits is not None:
         fields |= _greatest_steps(skeleton, fields, limits, step_cm)
@@ -246,14 +240,24 @@ def _halvings(skeleton: Skeleton, step: float, step_cm: float) -> int:
     return max(math.ceil(math.log2(needed)), 6)
 
 
-def _spreads(rows: Floats) -> Floats:
-    """The deviation of each channel from its mean, (n_channels,); 0 if unknown."""
+def _sampled_spreads(source: SignalSource, skeleton: Skeleton) -> Floats:
+    """The deviation of each channel from its mean, (n_channels,); 0 if unknown or of no use."""
+    spatial = _spatial_kinds(skeleton)
+    plain = (channel.kind not in spatial for channel in skeleton.channels)
+    if has_kinematics(skeleton, whole=True) and not any(plain):
+        return np.zeros(skeleton.n_channels)
+    rows = sample(source, SAMPLED_FRAMES)
     known = np.isfinite(rows)
     n = np.maximum(known.sum(axis=0), 1)
     means = np.where(known, rows, 0.0).sum(axis=0) / n
     with np.errstate(over="ignore"):  # values that are refused later
         spreads: Floats = np.sqrt((np.where(known, rows - means, 0.0) ** 2).sum(axis=0) / n)
     return spreads
+
+
+def _spatial_kinds(skeleton: Skeleton) -> tuple[str, ...]:
+    """Kinds of channels that are in the metric of a skeleton that moves points."""
+    return (*ANGLE_KINDS, *POSITION_KINDS) if has_whole_turns(skeleton) else SPATIAL
 
 
 def _plain_steps(
@@ -271,7 +275,7 @@ def _plain_steps(
         return code_of(float(np.median(own)) * share) if own else code_of(1.0)
 
     moving = has_kinematics(skeleton, whole=True)
-    spatial = (*ANGLE_KINDS, *POSITION_KINDS) if has_whole_turns(skeleton) else SPATIAL
+    spatial = _spatial_kinds(skeleton)
     of_quaternions = code_of(math.radians(GREATEST_DEGREES) / 2)
     plain = [
         of_quaternions
@@ -360,60 +364,3 @@ def distortion(header: Header, skeleton: Skeleton, values: Floats, decoded: Floa
             mean = float(np.sqrt(np.sum(points * points, axis=0)).mean())
             away.append(mean * math.sqrt(header.weights[joint]))
     return float(np.mean(away)) if away else 0.0
-
-
-SOURCE_ORDER = 0  # code of the order of the source
-RUNS, RUN_FRAMES = 16, 128  # sampled runs of a long clip
-DUE = 0.985  # an order is chosen if its score is below this share of the source's
-VECTOR_SHARE = 0.96  # of their score: vectors suit the metric better than angles
-STILL = 1e-4  # of a turn: a joint whose steps change by less keeps its order
-GREATEST = 2.0**20  # of an angle, whose sine is exact enough in any unit
-
-
-def choose_orders(source: SignalSource, exact: Container[int] = ()) -> dict[int, int]:
-    """Codes of orders by joint, of joints that are calmer in another than the source's.
-
-    Joints with ``exact`` channels keep the source's order. Angles that jump or turn fast cost
-    bytes: bits by the logarithms of their second differences, approximated by roots.
-    """
-    skeleton = skeleton_of(NAME, source.layout)
-    joints = [
-        index
-        for index, joint in enumerate(skeleton.joints)
-        if own_sequence(joint, skeleton) is not None
-        and not any(channel in exact for channel in skeleton.columns(index))
-    ]
-    if not joints:
-        return {}
-    columns = np.array([columns_by_axis(skeleton, index) for index in joints])
-    scores, highest, n_rows = np.zeros((1 + N_ORDERS, len(joints))), np.zeros(len(joints)), 0
-    roots = [skeleton.joints[joint].parent < 0 for joint in joints]
-    orders = [
-        Orders(dict.fromkeys(joints, code) if code != SOURCE_ORDER else {}, skeleton)
-        for code in range(1 + N_ORDERS)
-    ]
-    for values in _runs(source):
-        n_rows += len(values)
-        highest = np.maximum(highest, np.abs(values[:, columns]).max(axis=(0, 2), initial=0.0))
-        values = np.clip(values, -GREATEST, GREATEST)
-        for code, order in enumerate(orders):
-            coded = order.to_coded_order(values)[:, columns]
-            scores[code] += np.sqrt(np.abs(np.diff(coded, 2, axis=0))).sum(axis=(0, 2))
-    scores[VECTOR_CODE] = np.where(roots, math.inf, VECTOR_SHARE * scores[VECTOR_CODE])
-    full = orders[SOURCE_ORDER].full
-    moves = (scores[SOURCE_ORDER] > np.sqrt(STILL * full) * n_rows) & (highest < GREATEST)
-    worth = moves & (scores.min(axis=0) < DUE * scores[SOURCE_ORDER])
-    best = np.where(worth, scores.argmin(axis=0), SOURCE_ORDER).tolist()
-    return {joint: code for joint, code in zip(joints, best, strict=True) if code != SOURCE_ORDER}
-
-
-def _runs(source: SignalSource) -> Iterator[Floats]:
-    """Runs of frames, evenly spread; the whole of a short clip."""
-    n_frames = source.layout.n_frames
-    starts, length = np.zeros(1, np.int64), n_frames
-    if n_frames > RUNS * RUN_FRAMES:
-        starts, length = np.linspace(0, n_frames - RUN_FRAMES, RUNS).astype(np.int64), RUN_FRAMES
-    for start in starts.tolist():
-        reader = FrameReader(NAME, source)
-        reader.at = start
-        yield reader.next(start + length)

@@ -54,6 +54,7 @@ class LevelCoder:
         self.usual = Metric(header, skeleton, kept, first)
         self.metric = self._metric_of(0)  # of the present level
         self.poses = self.approx = np.zeros((0, len(self.kept)))
+        self._factors: Floats | None = None  # of all poses, where both ways through them are due
         self.lanes = kernels().lanes_of(self.metric.plan, 1)
         self.course = kernels().course_of(first, self.kept, header.greatest[self.kept])
 
@@ -100,10 +101,11 @@ class LevelCoder:
     def code_details(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
         """Encode a level of details, all rows at once; ``code`` returns the decoded rows."""
         which = self._poses_of(level)
-        coefficients = self._map_rows(self.metric.to_metric, which, rows) / self.steps(
-            level, exponents
-        )
-        self._add(level, which, code(coefficients), exponents)
+        if len(self.poses) * self.metric.plan.n_entries <= BLOCK_ENTRIES:
+            self._factors = self.metric.factors(self.poses)
+        coefficients = self._map_rows(self.metric.to_metric, which, rows)
+        self._add(level, which, code(coefficients / self.steps(level, exponents)), exponents)
+        self._factors = None
 
     def take_details(self, level: int, rows: Floats, exponents: Ints) -> None:
         """A level of details from its rows in the metric, in steps."""
@@ -133,6 +135,9 @@ class LevelCoder:
 
     def _map_rows(self, way: Any, which: Ints, rows: Floats) -> Floats:
         """Rows one way through the metric, each at the pose of number ``which``."""
+        if self._factors is not None:
+            result: Floats = way(self._factors, rows, which)
+            return result
         mapped = np.empty_like(rows)
         n_rows = min(max(BLOCK_ENTRIES // max(1, self.metric.plan.n_entries), 8), 512)
         for start in range(0, len(rows), n_rows):
