@@ -74,7 +74,7 @@ class Lengths:
         shorter = max(self.unit, length // 2 // self.unit * self.unit)
         return shorter if self.least <= shorter < length else length
 
-    def fit(self, length: int, n_frames: int, n_bytes: int) -> int:
+    def fit(self, length: int, n_frames: int, n_bytes: float) -> int:
         """Halve ``length`` while a segment is too large, of which ``n_frames`` take ``n_bytes``."""
         most = float(TARGET_BYTES)
         while n_bytes * min(length, n_frames) > most * n_frames:

@@ -86,11 +86,15 @@ COARSEST_WEIGHT = 0.096  # of a bit at level 0, whose errors affect later rows
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The header of a clip, the weight of a bit against a squared step, contacts to keep."""
+    """The header of a clip, the weight of a bit against a squared step, contacts to keep.
+
+    ``frame_bytes`` is an estimate of the bytes of a frame, 0 if there is none.
+    """
 
     header: bytes
     weights: Weights
     tracker: ContactTracker | None = None
+    frame_bytes: float = 0.0
 
 
 def choose(source: SignalSource, params: Params) -> Choice:
@@ -121,12 +125,12 @@ def choose(source: SignalSource, params: Params) -> Choice:
     fields["flags"] |= vectors
     if params.get("weights") is not None:
         fields["weights"] = [code_of(float(weight)) for weight in params["weights"]]
-    fields["levels"] = like.levels if like else params["levels"]
+    fields["levels"], frame_bytes = like.levels if like else params["levels"], 0.0
     if fields["levels"] is None:
-        fields["levels"] = best_levels(source, skeleton, fields, weights, step_cm)
+        fields["levels"], frame_bytes = best_levels(source, skeleton, fields, weights, step_cm)
     fields["borrowing"] = min(1, fields["levels"])
     fields["contacts"], tracker = _contacts(source, params, step / step_cm)
-    return Choice(build_header(**fields), weights, tracker)
+    return Choice(build_header(**fields), weights, tracker, frame_bytes)
 
 
 def _contacts(
@@ -308,13 +312,16 @@ def _greatest_steps(skeleton: Skeleton, fields: Params, limits: Floats, step_cm:
 
 def best_levels(
     source: SignalSource, skeleton: Skeleton, fields: Params, weights: Weights, step_cm: float
-) -> int:
-    """Number of levels with the best rate-distortion over the start of the clip."""
+) -> tuple[int, float]:
+    """Number of levels with the best rate-distortion over the start of the clip.
+
+    Also the bytes of a frame there, 0 if nothing was tried.
+    """
     layout = source.layout
     tried, most_frames = next(row[1:] for row in LEVELS if step_cm < row[0])
     n_frames = min(most_frames, layout.n_frames, layout.most_frames)
     if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(tried):
-        return min(tried)
+        return min(tried), 0.0
     values = FrameReader(NAME, source).next(n_frames)
     orders = Orders(joint_codes(fields["flags"], fields["orders"], skeleton), skeleton)
     coded = orders.to_coded_order(values)
@@ -324,6 +331,8 @@ def best_levels(
         fields, price = {**fields, **plain}, DEPENDENT_PRICE
         weights = Weights(weights.approximations / price, weights.details / price)
 
+    sizes: dict[int, int] = {}
+
     def score(levels: int) -> float:
         own = {"levels": levels, "borrowing": min(1, levels)}
         header = parse_posewave_header(build_header(**{**fields, **own}), layout)
@@ -331,9 +340,11 @@ def best_levels(
         decoded = orders.values(decoded[::SAMPLE_DISTANCE], no_notes)
         decoded[:, header.exact] = values[::SAMPLE_DISTANCE, header.exact]
         error = distortion(header, skeleton, values[::SAMPLE_DISTANCE], decoded)
-        return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
+        sizes[levels] = sum(map(len, streams))
+        return math.log(sizes[levels]) + EXCHANGE * math.log(max(error, 1e-300))
 
-    return _minimize(tried, score)
+    levels = _minimize(tried, score)
+    return levels, sizes[levels] / n_frames
 
 
 def _minimize(tried: Sequence[int], score: Callable[[int], float]) -> int:

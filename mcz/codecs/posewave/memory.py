@@ -31,10 +31,14 @@ def trial_of(header: bytes, first: int, stop: int, refinement: Ints | None) -> T
 
 
 class Memory:
-    """The streams of all trials, and the rows of the last step that was tried."""
+    """The streams of all trials, and the rows of the last step that was tried.
+
+    ``frame_bytes`` is about what a frame will take.
+    """
 
     def __init__(self) -> None:
         self.streams: dict[Trial, Streams] = {}
+        self.frame_bytes = 0.0
         self._settings: tuple[object, ...] = ()
         self._rows: dict[tuple[int, int], RowMemory] = {}
 

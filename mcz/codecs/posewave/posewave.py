@@ -17,6 +17,7 @@ import itertools
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -153,6 +154,7 @@ class LiveDecoder:
 
 MOST_FRAMES = 8192  # of a segment, by default
 LEAST_FRAMES = 512
+UNLIKE = 0.9  # of a trial's bytes, those that the next one takes at least
 _LIMIT = re.compile(r"(?P<name>.+)=(?P<number>[0-9.e+-]+) ?(?P<unit>[a-z]+)")
 
 
@@ -186,10 +188,13 @@ def _segments(
     length = min(requested or MOST_FRAMES, layout.most_frames)
     if header.exact_groups:
         length = min(length, most_frames(layout, header.exact_groups))
-    lengths = Lengths(length, bool(requested), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
     octaves, tracker, lossy = params["refinement"], choice.tracker, _lossy(header, layout)
     memory: Memory = (not tracker and params["memory"]) or Memory()
+    lengths = Lengths(length, bool(requested), least=LEAST_FRAMES)
+    if not requested:  # what is surely too large need not be coded first
+        n_frames, each = min(length, layout.n_frames), choice.frame_bytes or memory.frame_bytes
+        lengths = replace(lengths, length=lengths.fit(length, n_frames, each * n_frames))
 
     def code(first: int, stop: int) -> tuple[bytes, ...]:
         own = None if octaves is None else octaves[first:stop]
@@ -219,8 +224,11 @@ def _segments(
         return tuple(streams.get(place, b"") for place in places)
 
     breaks = source.breaks if header.exact_groups else ()
+    n_bytes = 0
     for first, stop, streams in segments_by_halving(layout.n_frames, lengths, code, breaks):
         yield Segment(first, stop - first, streams)
+        n_bytes += sum(map(len, streams))
+    memory.frame_bytes = UNLIKE * n_bytes / max(layout.n_frames, 1)
     if tracker and header.contacts:
         tracker.warn(skeleton, header.contacts)
 
