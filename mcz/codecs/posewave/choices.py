@@ -76,10 +76,10 @@ EXCHANGE = 0.75  # fall of bytes per rise of errors, in logarithms, for comparin
 STEPS_CM = 0.01, 0.045  # between these steps the weight of a bit goes from the first to the second
 RATE_WEIGHTS = 0.072, 0.112
 USUAL = (  # steps, mean errors
-    (0.0055, 0.03, 0.065, 0.14, 0.28, 0.56, 1.1, 2.2),
-    (0.01, 0.046, 0.079, 0.13, 0.205, 0.32, 0.55, 0.9),
+    (0.0045, 0.009, 0.018, 0.036, 0.07, 0.14, 0.28, 0.56, 1.2, 2.6),
+    (0.0083, 0.0158, 0.0297, 0.0516, 0.0851, 0.131, 0.202, 0.322, 0.556, 1.01),
 )
-MEAN_TO_BOUND = 0.195  # the mean error with which a bound takes few bytes and trials
+MEAN_TO_BOUND = 0.2  # the mean error with which a bound takes few bytes and trials
 STEP_OF_BOUND = 0.2  # live, where rows of frames that are farther off get finer ones
 COARSEST_WEIGHT = 0.096  # of a bit at level 0, whose errors affect later rows
 

@@ -44,16 +44,19 @@ from mcz.model.types import JsonObject, Params, Progress
 
 PRESET, LIMITS = "preset", "limits"
 GOAL = 0.985  # of a target: near enough to stop
+AIM = 0.5 * (1 + GOAL)
 PROMISED = 0.97  # of a target: less is remarked upon
 MOST_TRIALS = 60
 MOST_TURNS = 4  # of weights and a target, each adjusted to the other
 CLOSE = 1.00002  # between a setting that meets the target and one that does not
+MOST_GUIDED = 4  # trials that follow the dial's guesses
 GUESSED = 1.25  # from a setting that was guessed to the next
 MOST_EQUAL = 3  # equal figures in a row: the next setting is the last of the range
 NEAR_FACTOR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried near the best one
 
 Tuned = tuple[JsonObject, dict[str, str]]  # parameters, and entries of the quality record
 Point = tuple[float, float]  # a setting and its figure
+Bracket = tuple[Point, Point, bool]  # one that meets the target, one that misses, if a range ended
 
 
 def write_motion(
@@ -214,7 +217,8 @@ def search(
         tried.append((setting, measure(target, setting)))
         return tried[-1][1]
 
-    meets, misses, ended = _bracket(dial, target, measured)
+    bracket = _follow_guesses(dial, target, measured) or _bracket(dial, target, measured)
+    meets, misses, ended = bracket
     if ended:
         return *meets, True
     for _ in range(MOST_TRIALS):
@@ -256,9 +260,7 @@ def _search_beside(
     return best
 
 
-def _bracket(
-    dial: Dial, target: Target, measure: Callable[[Target, float], float]
-) -> tuple[Point, Point, bool]:
+def _bracket(dial: Dial, target: Target, measure: Callable[[Target, float], float]) -> Bracket:
     guessed = dial.guess and dial.guess(target.name, target.limit)
     setting = _fit_range(dial, guessed or 1.0)
     point = setting, _measure_figure(dial, measure, target, setting)
@@ -285,6 +287,34 @@ def _bracket(
         point = other
 
 
+def _follow_guesses(
+    dial: Dial, target: Target, measure: Callable[[Target, float], float]
+) -> Bracket | None:
+    """A bracket from settings at which the dial's guesses expect the target.
+
+    They are right about how figures change, if not about those of a clip. None if there are no
+    guesses, or none on the other side of the target.
+    """
+    aim = AIM * target.limit
+    meets: Point | None = None
+    misses: Point | None = None
+    setting = dial.guess(target.name, aim) if dial.guess and not dial.whole else None
+    for _ in range(MOST_GUIDED):
+        if setting is None or not dial.low < setting < dial.high:
+            return None
+        point = setting, _measure_figure(dial, measure, target, setting)
+        if point[1] <= target.limit:
+            meets = point
+        else:
+            misses = point
+        if meets and (misses or meets[1] >= GOAL * target.limit):
+            return meets, misses or meets, False
+        assert dial.guess is not None
+        here, there = (dial.guess(target.name, figure or aim) for figure in (point[1], aim))
+        setting = setting * there / here if here and there and point[1] < math.inf else None
+    return None
+
+
 def _measure_figure(
     dial: Dial, measure: Callable[[Target, float], float], target: Target, setting: float
 ) -> float:
@@ -308,6 +338,6 @@ def _between(meets: Point, misses: Point, limit: float) -> float:
     low, high = math.log(meets[0]), math.log(misses[0])
     share = 0.5
     if 0 < meets[1] < misses[1] < math.inf:
-        target = math.log(0.5 * (1 + GOAL) * limit)
+        target = math.log(AIM * limit)
         share = (target - math.log(meets[1])) / (math.log(misses[1]) - math.log(meets[1]))
     return math.exp(low + min(max(share, 0.05), 0.95) * (high - low))
