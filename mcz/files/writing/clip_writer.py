@@ -202,7 +202,7 @@ def write_trial(prepared: Prepared, codec: Codec, params: Params, profile: Profi
     out = io.BytesIO()
     writer = Writer(out, profile=profile)
     plan = plan_clip(prepared, codec, params, profile)
-    decoded = _write_clip(writer, plan, None)
+    decoded = _write_clip(writer, plan, ClipCopy(profile))
     writer.finish()
     values = tuple(signal.values for signal in decoded)
     return Trial(out.getvalue(), plan.signals[0].encoded.header, values)
@@ -213,17 +213,19 @@ def write_plan(
     plan: ClipPlan,
     progress: Progress | None = None,
     *,
+    quality: bool = True,
     remarks: Mapping[str, str] = MappingProxyType({}),
     amend: Amend | None = None,
+    copy: ClipCopy | None = None,
 ) -> dict[str, str] | None:
     """Write one clip: its skeletons and template if new, CLIP, segments, CEND, quality if lossy.
 
     Returns the quality record, None if there is none. ``remarks`` are added to it, ``amend`` edits
-    it last.
+    it last. ``copy`` decodes the clip before it ends.
     """
     motion, codec = plan.motion, plan.codec
-    decoded = _write_clip(writer, plan, progress)
-    if codec.lossless:
+    decoded = _write_clip(writer, plan, copy or ClipCopy(writer.profile), progress)
+    if not quality or codec.lossless:
         return None
     settings, values = codec.settings(plan.options), [signal.values for signal in decoded]
     named = quality_record(motion, values, codec.name, settings, remarks)
@@ -233,9 +235,11 @@ def write_plan(
     return with_names(stored, motion.skeleton)
 
 
-def _write_clip(writer: Writer, plan: ClipPlan, progress: Progress | None) -> list[Decoded]:
-    """Write one clip up to CEND; return its signals as decoded from a copy."""
-    motion, copy = plan.motion, ClipCopy(writer.profile)
+def _write_clip(
+    writer: Writer, plan: ClipPlan, copy: ClipCopy, progress: Progress | None = None
+) -> list[Decoded]:
+    """Write one clip up to CEND; return its signals as decoded from ``copy``."""
+    motion = plan.motion
     record = _write_references(writer, plan)
     for model in plan.models:
         copy.writer.shared(ChunkType.MODL, model)

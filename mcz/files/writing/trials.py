@@ -38,6 +38,7 @@ BLOCK_FRAMES = 4096  # with positions in memory at a time
 REFINEMENT = "refinement"
 MOST_OCTAVES = 7
 MOST_ROUNDS = 10  # with one step
+WIDER = 4  # rounds after which frames one farther away are refined, too
 MOST_STEPS = 6
 FINER = 0.85  # from one step to the next
 USUAL_STEP = 1.0  # of a bound of channels, whose steps follow from it
@@ -197,7 +198,7 @@ def meet_bound(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, d
     step = min(max(guessed or _first_step(dial, target, trial), dial.low), dial.high)
     for _ in range(MOST_STEPS):
         octaves: NDArray[np.int64] = np.zeros(trial.motion.n_frames, np.int64)
-        for width in range(1, MOST_ROUNDS + 1):
+        for number in range(MOST_ROUNDS):
             params = {dial.parameter: step, REFINEMENT: octaves}
             try:
                 errors = trial.frame_errors(target, params)
@@ -207,7 +208,7 @@ def meet_bound(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, d
             if not (errors > target.limit).any():
                 reached = float(errors.max(initial=0.0))
                 return params, {"target_reached": repr(reached)}
-            octaves = _refine(octaves, errors / target.limit, width)
+            octaves = _refine(octaves, errors / target.limit, 1 + number // WIDER)
         missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
         step = max(step * FINER, dial.low)
     raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
