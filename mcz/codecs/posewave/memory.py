@@ -7,11 +7,12 @@ the result. Where only steps of some rows differ, the other rows keep their valu
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from mcz.codecs.posewave.header import Header
 from mcz.codecs.posewave.row_coder import RowMemory
-from mcz.model.types import Ints
+from mcz.model.types import Floats, Ints
 
 Streams = tuple[bytes, ...]
 
@@ -30,6 +31,9 @@ def trial_of(header: bytes, first: int, stop: int, refinement: Ints | None) -> T
     return Trial(header, first, stop, octaves)
 
 
+Encode = Callable[[RowMemory | None], tuple[Streams, Floats]]  # of one segment
+
+
 class Memory:
     """The streams of all trials, and the rows of the last step that was tried.
 
@@ -37,12 +41,19 @@ class Memory:
     """
 
     def __init__(self) -> None:
-        self.streams: dict[Trial, Streams] = {}
         self.frame_bytes = 0.0
+        self._streams: dict[Trial, Streams] = {}
         self._settings: tuple[object, ...] = ()
         self._rows: dict[tuple[int, int], RowMemory] = {}
 
-    def rows(self, header: Header, trial: Trial) -> RowMemory:
+    def streams(self, trial: Trial, header: Header, encode: Encode) -> Streams:
+        """The streams of a segment, by ``encode`` unless they are known."""
+        if trial not in self._streams:
+            rows = self._rows_of(trial, header) if trial.octaves else None
+            self._streams[trial], _ = encode(rows)
+        return self._streams[trial]
+
+    def _rows_of(self, trial: Trial, header: Header) -> RowMemory:
         """The rows of a segment; new ones where more than steps of rows differs from earlier."""
         settings = header.step, header.levels, header.weights.tobytes()
         if settings != self._settings:

@@ -211,14 +211,9 @@ def _segments(
             if tracker:
                 tracker.first = first
             trial = trial_of(choice.header, first, stop, own)
-            levels = memory.streams.get(trial, ())
-            if not levels:
-                rows = None if own is None else memory.rows(header, trial)
-                with np.errstate(over="ignore"):  # of values that are refused in the end
-                    levels, _ = encode_segment(
-                        header, skeleton, values, choice.weights, own, tracker, rows
-                    )
-                memory.streams[trial] = levels
+            settings = header, skeleton, values, choice.weights, own, tracker
+            with np.errstate(over="ignore"):  # of values that are refused in the end
+                levels = memory.streams(trial, header, partial(encode_segment, *settings))
             streams |= {(level, lossy[0]): stream for level, stream in enumerate(levels)}
         places = itertools.product(range(header.levels + 1), range(len(layout.groups)))
         return tuple(streams.get(place, b"") for place in places)
