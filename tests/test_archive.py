@@ -238,7 +238,7 @@ def test_a_rate_that_is_not_the_files_is_told(samples: Path, tmp_path: Path) -> 
     report = mcz.pack(samples, tmp_path / "a.mcz", rate=100, force_rate=True)
     said = {outcome.path: " ".join(outcome.notes) for outcome in report.outcomes}
     for name in ("walk.c3d", "walk.bvh"):
-        assert "120 frames a second are kept as 100" in said[name]
+        assert "120 frames a second are replaced by 100" in said[name]
     assert said["walk.amc"] == ""  # it says none
     report = mcz.pack(samples, tmp_path / "b.mcz", rate=120.0001)  # near enough
     assert not any("kept as" in " ".join(outcome.notes) for outcome in report.outcomes)

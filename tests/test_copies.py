@@ -147,7 +147,7 @@ def test_what_is_sound_is_kept(archive_bytes: bytes) -> None:
         other = build_chunk(ChunkType.COPY, build_copies(lie, copy.offset), ChunkFlag.ANCILLARY)
         bad = archive_bytes[: copy.offset] + other + archive_bytes[copy.offset + copy.size :]
         with mcz.open(bad, salvage=True) as file:
-            assert any("is not used: what lies there is sound" in line for line in file.damage)
+            assert any("is not used, because the original is intact" in line for line in file.damage)
             assert not any("copy is used" in line for line in file.damage)
         assert content(bad, salvage=True) == content(archive_bytes)
         with pytest.raises(FormatError):
@@ -201,7 +201,7 @@ def test_a_skeleton_is_made_again_from_its_asf(
     for at in (2, 20, skel.size - 1):
         bad = change_bytes(data, skel.offset + at)
         with mcz.open(bad, salvage=True) as file:
-            how = "header is wrong, and put right" if at == 2 else "made again from its ASF, SRCE"
+            how = "header was corrected" if at == 2 else "rebuilt from its ASF, SRCE"
             assert any(how in line for line in file.damage)
             again = pickle.loads(pickle.dumps(file))
             assert list(again.clips) == list(file.clips)

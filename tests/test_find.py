@@ -334,7 +334,7 @@ def test_diff(call: Call, archive: Path, archive_path: Path, samples: Path) -> N
     assert code == 0 and "walk.bvh" in out, err
     bvh = samples / "walk.bvh"
     code, _, err = call("diff", bvh, bvh, "--where", "n_frames > 0")
-    assert code == 2 and "--where chooses among the clips of an .mcz" in err
+    assert code == 2 and "--where selects clips of an .mcz" in err
     code, _, err = call("diff", archive, archive_path, "--where", "n_frames > 0")
     assert code == 2 and "no clip in common" in err
 
@@ -366,7 +366,7 @@ def test_info_refuses_more(call: Call, archive: Path, samples: Path) -> None:
         code, _, err = call("info", archive, option, *where)
         assert code == 2 and "without --clip and --where" in err
     code, _, err = call("info", samples / "walk.bvh", *where)
-    assert code == 2 and "--where chooses among the clips of an .mcz" in err
+    assert code == 2 and "--where selects clips of an .mcz" in err
 
 
 def test_an_error_as_json(call: Call, archive: Path) -> None:

@@ -353,7 +353,7 @@ def test_the_command(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     document = json.loads(printed)
     assert (code, document["width"], document["height"]) == (0, 200, 100)
     assert document["bytes"] == out.stat().st_size
-    assert "its up axis is unknown: y up assumed; set the up axis (--up)" in said
+    assert "its up axis is unknown; y is assumed; set the up axis (--up)" in said
     assert "frame rate" not in said  # of a still
     code, printed, _ = call(samples / "walk.bvh", "-o", "memory://a.png", "--size", "64")
     assert (code, "64 x 64 pixels" in printed) == (0, True)  # a store has nothing on the disk

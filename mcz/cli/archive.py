@@ -79,10 +79,14 @@ def pack_command(
     """
     check_force_rate(options)
     if scheduler is not None and mtimes:
-        raise Failure("--mtimes are not kept with --scheduler", Exit.USAGE)
+        raise Failure("--mtimes and --scheduler exclude each other", Exit.USAGE)
     if "://" not in folder:
         if Path(folder).is_file():
-            raise Failure(f"is a file: mcz encode {shlex.quote(folder)}", Exit.USAGE, path=folder)
+            raise Failure(
+                f"it is a file, not a folder; use mcz encode {shlex.quote(folder)}",
+                Exit.USAGE,
+                path=folder,
+            )
         target = resolve_output(target, str(Path(folder).resolve()) + ".mcz")
     if mtimes:
         options["mtimes"] = True
@@ -180,7 +184,9 @@ def append_command(
             require_file(path)
     check_force_rate(options)
     if salvage and force:
-        raise Failure("--salvage keeps what --force drops; choose one", Exit.USAGE)
+        raise Failure(
+            "--salvage and --force exclude each other: one keeps what the other drops", Exit.USAGE
+        )
     if "-" in sources:
         raise Failure("append reads files, not standard input", Exit.USAGE)
     with errors_about(target), Progress() as progress:

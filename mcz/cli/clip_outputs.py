@@ -111,8 +111,8 @@ def _solve_skeleton(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
     base = clip.base_skeleton
     if base is None:
         raise Failure(
-            f"{clip.container.source.name}: clip {clip.name!r} names no skeleton that --solve-ik "
-            "could fit to its positions",
+            f"{clip.container.source.name}: clip {clip.name!r} names no skeleton for "
+            "--solve-ik to fit",
             Exit.USAGE,
         )
     return from_positions(motion, base)

@@ -207,7 +207,7 @@ def _training_lines(document: JsonObject) -> Iterator[str]:
         f"{plural(document['n_frames'], 'frame')} in {plural(document['n_clips'], 'clip')}"
     )
     if document["n_filled"]:
-        yield f"  points were missing, and filled, in {plural(document['n_filled'], 'frame')}"
+        yield f"  missing points were filled in {plural(document['n_filled'], 'frame')}"
     head = ("coordinate", "iterations", f"at the start, {document['unit']}", "at the end")
     rows = [
         (axis, str(stage["iterations"]), f"{stage['start']:.5g}", f"{stage['end']:.5g}")

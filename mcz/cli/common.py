@@ -302,7 +302,7 @@ def open_input(path: str, **options: Any) -> Iterator[File]:
     target = bytes_or_path(path)
     with errors_about(path), add_salvage_hint(target, options), mcz.open(target, **options) as file:
         if file.grows:
-            say(f"{path}: another process is appending to it; this is what it held before")
+            say(f"{path}: another process is appending to it; earlier contents are shown")
         yield file
 
 

@@ -175,7 +175,9 @@ def decode(
     """Write the requested outputs of an input, and report them."""
     file, salvage = given.file, given.salvage
     if output == "-" and (as_json or options.with_skeleton):
-        raise JsonRefused("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
+        raise JsonRefused(
+            "-o - writes to standard output, so it excludes --json and --with-skeleton", Exit.USAGE
+        )
     if given.is_source:
         given, options = given.with_facts(options)
         refuse(output is None and options.target is None, f"{file}: {SOURCE_GIVEN}")
@@ -233,13 +235,15 @@ def _output_without_clips(file: File, names: tuple[str, ...]) -> Output:
     """The attachment of this name, or the only attachment or skeleton of a file without clips."""
     attachments = list(file.attachments)
     if len(names) > 1:
-        raise Failure("no clips; of attachments one is decoded, mcz unpack writes all", Exit.USAGE)
+        raise Failure(
+            "there are no clips; decode writes one attachment, mcz unpack all", Exit.USAGE
+        )
     if not names and not attachments and len(file.skeletons) == 1:
         return skeleton_output(file, file.skeletons[0][0])
     name = next(iter(names or attachments), "")
     if name not in file.attachments or (not names and len(attachments) > 1):
         shown = ", ".join(attachments) or "nothing"
-        raise Failure(f"no clips; choose with --clip among {shown}", Exit.USAGE)
+        raise Failure(f"there are no clips; choose one of {shown} with --clip", Exit.USAGE)
     data = file.attachments[name].read()
     return Output("attachment", PurePosixPath(name).name, data, RESTORED)
 

@@ -221,7 +221,7 @@ def _filter_names(left: _Side, right: _Side, names: tuple[str, ...], where: str)
     """The names of the clips that match ``where``; empty if each side is one clip."""
     side = left if left.file is not None else right
     if side.file is None:
-        raise Failure("--where chooses among the clips of an .mcz", Exit.USAGE)
+        raise Failure("--where selects clips of an .mcz, and neither file is one", Exit.USAGE)
     clips = side.file.chosen(names or None, where)
     if names:
         return tuple(name for name in names if side.file[name] in clips)
@@ -248,7 +248,7 @@ def _compare(left: _Side, right: _Side, name: str | None, options: _Options) -> 
     if one.motion.n_frames != other.motion.n_frames:
         raise Failure(
             f"{left.path} has {one.motion.n_frames} frames, {right.path} "
-            f"{other.motion.n_frames}; --frames A:B chooses what both have"
+            f"{other.motion.n_frames}; choose common ones with --frames A:B"
         )
     with errors_about(f"{left.path}, {right.path}"):
         document = diff_document(

@@ -95,10 +95,10 @@ def encode_command(
     if source == "-":
         return _encode_piped(output, skeleton, force, as_json, format_name, **options)
     if format_name is not None:
-        raise Failure("--format is for standard input; SRC has a suffix", Exit.USAGE)
+        raise Failure("--format applies only to standard input; SRC has a suffix", Exit.USAGE)
     require_file(source, f": mcz pack {shlex.quote(source)} OUT.mcz")
     if source.lower().endswith(".mcz"):
-        raise Failure("is an .mcz already; mcz append adds it to another", path=source)
+        raise Failure("it is an .mcz already; to add it to another, use mcz append", path=source)
     return _encode_file(source, output, skeleton, force, as_json, **options)
 
 
@@ -117,7 +117,7 @@ def _encode_piped(
     refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     if options["codec"] is not None and codes_live(options["codec"], options["params"] or {}):
         if as_json:
-            raise JsonRefused("--json: coding frame by frame has no document", Exit.USAGE)
+            raise JsonRefused("--json is not available for encoding frame by frame", Exit.USAGE)
         encode_lines(output, force, format_name, skeleton, **options)
         return Exit.FINE
     if output is None:
@@ -144,7 +144,9 @@ def _encode_file(
     target = resolve_output(output or str(Path(source).with_suffix(".mcz")), source, ".mcz")
     unread = output == "-" or _is_special(target)
     if unread and as_json:
-        raise JsonRefused(f"-o {target} leaves no room for --json", Exit.USAGE)
+        raise JsonRefused(
+            f"-o {target} writes to standard output, so it excludes --json", Exit.USAGE
+        )
     sink = binary_output() if output == "-" else None
     piped = io.BytesIO()
     with errors_about(source), Progress() as progress:
@@ -171,7 +173,7 @@ def _tell(target: str, written: Written, as_json: bool) -> None:
 
     needed, allowed = max(written.decoded_bytes, written.source_bytes), output_limit(written.size)
     if needed > allowed:
-        say(f"{target}: reading it needs --max-decoded {needed}, the default is {allowed}")
+        say(f"{target}: to read it, set --max-decoded {needed}; the default is {allowed}")
     if not as_json:
         echo(summary(target, written))
         for clip in written.clips:

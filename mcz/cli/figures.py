@@ -128,9 +128,9 @@ def _contact_lines(figures: Mapping[str, str]) -> Iterator[str]:
     if "slide_mean_mm" in figures:
         where = _where(figures, "slide_max", "joint")
         at = f" ({where})" if where else ""
-        yield f"they slide {mean} mm on average, at most {most} mm{at}"
+        yield f"feet slide {mean} mm on average, at most {most} mm{at}"
     if "slide_path_mm" in figures:
-        yield f"they move {path} mm in all, {meant} mm in the original"
+        yield f"feet move {path} mm in all, {meant} mm in the original"
 
 
 def _printable_text(value: object) -> str:

@@ -113,10 +113,10 @@ def info_command(
 
     if is_source(file) and not (show_layout or check):
         if where is not None:
-            raise Failure("--where chooses among the clips of an .mcz", Exit.USAGE)
+            raise Failure("--where selects clips of an .mcz, and this file is not one", Exit.USAGE)
         return _of_source(file, skeleton, as_json, bool(preview))
     if skeleton is not None:
-        raise Failure("--skeleton is the ASF of an AMC", Exit.USAGE)
+        raise Failure("--skeleton applies only to an AMC", Exit.USAGE)
     if (clips or where is not None) and (show_layout or check):
         text = "--layout and --validate are of the whole file, without --clip and --where"
         raise Failure(text, Exit.USAGE)

@@ -60,7 +60,7 @@ def list_command(
     Only the index is read, unless --where, --columns or --sort need more.
     """
     if as_csv and as_json:
-        raise JsonRefused("--csv or --json, not both", Exit.USAGE)
+        raise JsonRefused("--csv and --json exclude each other", Exit.USAGE)
     names = None if columns is None else [name.strip() for name in columns.split(",")]
     with open_input(file, salvage=salvage) as opened_file, errors_about(file):
         clips = opened_file.chosen(where=where)

@@ -123,9 +123,9 @@ def meta_command(
     if of_file and (clips or where or table or rate):
         raise Failure("--file excludes --clip, --where, --from and --rate", Exit.USAGE)
     if set(pairs) & set(removed):
-        raise Failure(f"{sorted(set(pairs) & set(removed))[0]} is set and removed", Exit.USAGE)
+        raise Failure(f"{sorted(set(pairs) & set(removed))[0]} is both set and removed", Exit.USAGE)
     if form and (pairs or removed or table or rate or purge or of_file):
-        raise Failure("--to prints a record, and changes nothing", Exit.USAGE)
+        raise Failure("--to prints a record, so it excludes changes", Exit.USAGE)
     if form:
         with open_input(file) as opened_file, errors_about(file):
             return _describe(opened_file, opened_file.chosen(clips or None, where), form)
@@ -143,7 +143,7 @@ def meta_command(
     if unknown:
         from mcz.files.reading.clips import list_some
 
-        say(f"{table}: no clip for {plural(len(unknown), 'row')}: {list_some(unknown)}")
+        say(f"{table}: {plural(len(unknown), 'row')} without a clip: {list_some(unknown)}")
     return _set(file, changes, rate, (clips, where, force), purge, as_json)
 
 
@@ -180,7 +180,7 @@ def _describe(file: File, clips: Sequence[Clip], form: str) -> Exit:
     record, missing = describe(file, clips, form)
     print_json(record)
     for name, key in missing.items():
-        say(f"{file.name}: {form} requires {name}, which --file --set {key}=... states")
+        say(f"{file.name}: {form} requires {name}; set it with --file --set {key}=...")
     return Exit.FINE
 
 

@@ -58,7 +58,7 @@ def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_js
     """
     require_file(file)
     if anew and check:
-        raise Failure("--check changes nothing, --anew does; choose one", Exit.USAGE)
+        raise Failure("--check and --anew exclude each other: --check changes nothing", Exit.USAGE)
     if check:
         return _check_protection(file, as_json)
     import mcz
@@ -189,7 +189,7 @@ def bag_command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_j
 
     lines = [_info_line(text) for text in info]
     if len({name.lower() for name, _ in lines}) < len(lines):
-        raise Failure("--info: a name is given twice", Exit.USAGE)
+        raise Failure("--info: a name occurs twice", Exit.USAGE)
     with errors_about(folder):
         path = mcz.bag(files, folder, dict(lines), software=f"mcz {mcz.__version__}")
         check = check_bag(path)

@@ -65,7 +65,7 @@ def rename_command(
         raise Failure("give pairs: the old name and the new one", Exit.USAGE)
     pairs = dict(zip(names[::2], names[1::2], strict=True))
     if len(pairs) < len(names) // 2:
-        raise Failure("one old name is given twice", Exit.USAGE)
+        raise Failure("an old name occurs twice", Exit.USAGE)
     with errors_about(file), Progress() as progress:
         report = mcz.rename_clips(file, pairs, output=output, force=force, progress=progress)
     return print_clip_results(report, output or file, as_json, listed=("renamed",))

@@ -92,7 +92,9 @@ def replace_command(
     shown = output or file
     with errors_about(file):
         if output is not None and Path(output).exists() and Path(output).samefile(file):
-            raise Failure("it is IN.mcz itself; --in-place changes that", Exit.USAGE, path=output)
+            raise Failure(
+                "the output is IN.mcz itself; use --in-place to change it", Exit.USAGE, path=output
+            )
         refuse_inputs(shown, (table,))
         with mcz.open(file) as opened_file:
             values = read_values(table, opened_file.only_clip(name), joint)
@@ -149,7 +151,11 @@ def read_values(path: str, clip: Clip, joint: str) -> NDArray[np.float64]:
     if not missing:
         return values[:, [names.index(name) for name in expected]]
     if any(name in names for name in all_names) or values.shape[1] != len(expected):
-        raise Failure(f"no column {missing[0]}, and not exactly {len(expected)} columns", path=path)
+        raise Failure(
+            f"there is no column {missing[0]}, and the table does not have exactly "
+            f"{len(expected)} columns",
+            path=path,
+        )
     return values
 
 

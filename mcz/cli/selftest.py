@@ -101,7 +101,7 @@ def _try_codec(walk: Motion, codec: str) -> JsonObject:
     done = time.process_time()
     faults = [problem.message for problem in mcz.verify(data)]
     if CODECS[codec].lossless and decoded.values.tobytes() != walk.values.tobytes():
-        faults.append("other values are decoded than were encoded")
+        faults.append("the decoded values differ from the encoded ones")
     return {
         "bytes": len(data),
         "encode": round(walk.n_frames / max(encoded - started, 1e-9)),

@@ -118,7 +118,7 @@ def encode_lines(
     options["profile"] = options["profile"] != "base"
     for name in ("verbatim", "profile", "copies", "effort"):
         if options.pop(name):
-            raise Failure(f"--{name} has no meaning for coding frame by frame", Exit.USAGE)
+            raise Failure(f"--{name} does not apply to encoding frame by frame", Exit.USAGE)
     stream = live_input()
     name = format_name or ("bvh" if skeleton is None else "amc")
     with errors_about(NAME), live_output(target, force) as sink:
@@ -172,9 +172,9 @@ def rate_warning(traffic: LiveTraffic) -> str:
     assert traffic.seconds is not None
     all_, coded = (n / 125 / traffic.seconds for n in (traffic.frames, traffic.coded))
     return (
-        f"{traffic.asked:g} kbit/s cannot be held: packets, masks and repeated clip headers take "
-        f"{all_ - coded:.2f}, and {all_:.2f} is the least with them; --repeat 0, a longer "
-        "intra_period, fewer gaps or a lower frame rate reduce it"
+        f"{traffic.asked:g} kbit/s cannot be kept: packets, masks and repeated clip "
+        f"headers take {all_ - coded:.2f}, so the minimum is {all_:.2f}; --repeat 0, "
+        "a longer intra_period, fewer gaps or a lower frame rate reduce it"
     )
 
 

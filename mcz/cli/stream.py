@@ -283,7 +283,7 @@ def stream_decode_command(
     if connect is not None and file != "-":
         raise Failure("FILE.mcz and --connect exclude each other", Exit.USAGE)
     if binary and states:
-        raise Failure("--states has no place in binary rows", Exit.USAGE)
+        raise Failure("--states and --float32 exclude each other", Exit.USAGE)
     if rate is not None and not post_filter:
         raise Failure("--rate needs --post-filter", Exit.USAGE)
     from mcz.files.live.generators import stream_decode
@@ -382,7 +382,7 @@ def _print_all(reader: LiveReader, printer: _TextRows | _BinaryRows) -> None:
             if before is None:
                 output.write(printer.names(names))
             elif names != before:
-                raise Failure(f"clip {clip.name!r} begins, and has other channels")
+                raise Failure(f"clip {clip.name!r} has other channels than the clip before")
         output.write(printer.row(frame))
         output.flush()
 

@@ -69,7 +69,7 @@ def connect(
 def line_of(token: str) -> bytes:
     """The line that a client sends first; raises Failure for a bad token."""
     if not re.fullmatch("[!-~]{1,200}", token):
-        raise Failure("a token has 1 to 200 characters of ASCII, no blanks", Exit.USAGE)
+        raise Failure("a token must have 1 to 200 characters of ASCII, without blanks", Exit.USAGE)
     return token.encode() + b"\n"
 
 
@@ -170,7 +170,7 @@ class Listener:
         if compare_digest(_first_line(connection, len(self._token)), self._token):
             self._admit(connection, name)
             return
-        say(f"client {name} did not send the token, and is dropped")
+        say(f"client {name} did not send the token, and was disconnected")
         connection.close()
 
     def _admit(self, connection: socket.socket, name: str) -> None:
@@ -231,7 +231,10 @@ class _Client:
             too_slow = self._waiting > MOST_WAITING
             self._changed.notify()
         if too_slow:
-            say(f"client {self._name} is more than {MOST_WAITING:,} bytes behind, and is dropped")
+            say(
+                f"client {self._name} is more than {MOST_WAITING:,} bytes behind, and was "
+                "disconnected"
+            )
             self._drop()
 
     def finish(self, until: float) -> None:
@@ -241,7 +244,7 @@ class _Client:
             self._changed.notify()
         self._thread.join(max(0.0, until - monotonic()))
         if self._thread.is_alive():
-            say(f"client {self._name} did not take the rest, and is dropped")
+            say(f"client {self._name} did not accept the rest, and was disconnected")
         self._drop()
 
     def _feed(self) -> None:

@@ -83,14 +83,14 @@ def verify_command(
     against the manifests, then each .mcz in it.
     """
     if quick and (where is not None or source is not None):
-        raise Failure("--quick decodes nothing: it takes no --where and no --source", Exit.USAGE)
+        raise Failure("--quick decodes nothing, so it excludes --where and --source", Exit.USAGE)
     if date is not None and report is None:
-        raise Failure("--date belongs to --report", Exit.USAGE)
+        raise Failure("--date needs --report", Exit.USAGE)
     if source is not None:
         require_file(source)
     is_folder = Path(file).is_dir()
     if is_folder and (where is not None or source is not None):
-        raise Failure("--where and --source are of one file, not of a bag", Exit.USAGE)
+        raise Failure("--where and --source apply to one file, not to a bag", Exit.USAGE)
     report_file = None if report is None else VerifyReport(report, date, force, inputs=(file,))
     if is_folder:
         return _verify_bag(file, quick, max_decoded, report_file, as_json)
@@ -125,7 +125,9 @@ def _verify_bag(
     from mcz.files.bags import check_bag, is_bag
 
     if not is_bag(folder):
-        raise Failure("a folder and no bag: it has no bagit.txt", path=folder, kind="AccessError")
+        raise Failure(
+            "the folder is not a bag: it has no bagit.txt", path=folder, kind="AccessError"
+        )
     with errors_about(folder), Progress() as progress:
         bag = check_bag(folder, progress)
     fine, documents, files = not bag.problems, [], []
@@ -264,7 +266,7 @@ def _find_restore(file: File, source: str) -> Callable[[], bytes]:
         if PurePosixPath(attachment.name).name == name:
             return attachment.read
     if len(file.clips) != 1:
-        raise Failure("the file holds nothing of this name", Exit.USAGE, path=source)
+        raise Failure("the .mcz has no file of this name", Exit.USAGE, path=source)
     return file.only_clip().source_bytes
 
 
@@ -280,7 +282,7 @@ class VerifyReport:
 
         self.path, self.force = Path(path), force
         if self.path.suffix.lower() not in SUFFIXES:
-            raise Failure("a report is a .txt or a .json", Exit.USAGE, path=path)
+            raise Failure("a report must be a .txt or a .json", Exit.USAGE, path=path)
         with errors_about(path):
             refuse_inputs(path, inputs)
         check_new(self.path, force)

@@ -163,9 +163,9 @@ def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **op
 def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
     """Raise Failure for options of a page without -o, and of a server with it."""
     if output not in (None, "-") and not in_rerun and not output.lower().endswith(PAGES):
-        raise Failure("a page is a .html; mcz render draws films", Exit.USAGE, path=output)
+        raise Failure("a page must be an .html; for films, use mcz render", Exit.USAGE, path=output)
     if output == "-":
-        raise Failure("a page is written to a file, not to standard output", Exit.USAGE)
+        raise Failure("a page must be written to a file, not to standard output", Exit.USAGE)
     usual = {"no_browser": False, "keep": False, "host": LOOPBACK, "port": 0}
     of_server = [key for key in OF_SERVER if options[key] != usual[key]]
     if in_rerun:
@@ -237,7 +237,9 @@ def is_rerun(rerun: bool, output: str | None) -> bool:
     """Return whether ``--rerun`` or the output suffix selects rerun; raises Failure."""
     is_file = output is not None and output.lower().endswith(RERUN_SUFFIX)
     if rerun and output is not None and not is_file:
-        raise Failure(f"with --rerun a file is called OUT{RERUN_SUFFIX}", Exit.USAGE, path=output)
+        raise Failure(
+            f"with --rerun the output must be called OUT{RERUN_SUFFIX}", Exit.USAGE, path=output
+        )
     return rerun or is_file
 
 

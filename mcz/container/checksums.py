@@ -195,11 +195,13 @@ class _Places:
         if listed.head != self.head:
             faults.append("its copy of HEAD differs from HEAD")
         if list(listed.shared.items()) != list(self.shared.items()):
-            faults.append("it lists other skeletons, models or sources than there are")
+            faults.append("it lists other skeletons, models or sources than the file has")
         if [part for row in listed.attachments.values() for part in row.parts] != self.attachments:
-            faults.append("it lists other attachments than there are")
+            faults.append("it lists other attachments than the file has")
         if self.n_aliases != len(listed.aliases):
-            faults.append(f"it lists {len(listed.aliases)} aliases, there are {self.n_aliases}")
+            faults.append(
+                f"it lists {len(listed.aliases)} aliases, but the file has {self.n_aliases}"
+            )
         return faults + _clip_differences(self.clips, list(listed.clips.values()))
 
 

@@ -67,7 +67,7 @@ def restore_chunks(source: ByteSource, scanned: Found) -> tuple[Overlay | None, 
     parts: dict[int, bytes] = {}
     for copy, shift in _shift_copies(source, scanned, list(_read_copies(source, scanned, notes))):
         if shift is None:
-            notes.append(f"a copy of {copy.label} is not used: where it belongs is not clear")
+            notes.append(f"a copy of {copy.label} is not used, because its place is unclear")
             continue
         copy = replace(copy, offset=copy.offset + shift)
         chunk = copy.chunk
@@ -77,13 +77,13 @@ def restore_chunks(source: ByteSource, scanned: Found) -> tuple[Overlay | None, 
             continue
         fault = _fault_of(source, copy)
         if not fault or _overlaps(sound, copy.offset, copy.stop):  # SALV-08
-            notes.append(f"a copy of {copy.label} is not used: what lies there is sound")
+            notes.append(f"a copy of {copy.label} is not used, because the original is intact")
             continue
         notes.append(f"{copy.label}: {fault}; its copy is used")  # SALV-07
         parts[copy.offset] = chunk
     for offset, header in _mend_headers(source, scanned):
         if not any(at <= offset < at + len(part) for at, part in parts.items()):
-            notes.append(f"chunk at {offset}: one bit of its header is wrong, and put right")
+            notes.append(f"chunk at {offset}: one wrong bit of its header was corrected")
             parts[offset] = header
     return (Overlay(source, parts) if parts else None), notes
 
@@ -224,16 +224,16 @@ def restore_from_index(source: ByteSource, scanned: Found) -> list[str]:
         with suppress(FormatError):
             parse_head(listed.head)
             directory.head = listed.head
-            notes.append("no HEAD; it is taken from the index")
+            notes.append("HEAD is lost; it is taken from the index")
     for name, (of, target) in listed.aliases.items() if listed is not None else ():
         if name not in directory.aliases:
             directory.aliases[name] = of, target
-            notes.append(f"the alias {name!r} is lost; it is taken from the index")
+            notes.append(f"alias {name!r} is lost; it is taken from the index")
             record = payloads.Alia(name=name, of=of, target=target)
             alias = build_chunk(ChunkType.ALIA, build(record, "ALIA"))
             scanned.broken = [b for b in scanned.broken if not is_like(source, b[0], alias)]
     if not directory.head:
-        notes.append("no HEAD; the file is read as one of this version")
+        notes.append("HEAD is lost; the file is read as one of this version")
         directory.head = build_head(BASE)
     return notes
 

@@ -266,7 +266,7 @@ def test_feet_that_stand_slide(foot_files: tuple[Path, Path], call: Call) -> Non
     lines = [line.strip() for line in out.splitlines()]
     assert code == 0
     (said,) = [line for line in lines if line.startswith("contacts of feet: 1, ")]
-    (slid,) = [line for line in lines if line.startswith("they slide")]
+    (slid,) = [line for line in lines if line.startswith("feet slide")]
     assert "joint lfoot)" in slid and "mm on average, at most" in slid
     assert "feet: lfoot; z up (guessed), 120 frames a second (assumed)" in lines
     clip = call("diff", *foot_files, "--contacts", "--json").document["clips"][0]
@@ -323,7 +323,7 @@ def test_without_feet_nothing_is_said_unless_asked(tmp_path: Path, call: Call) -
 def test_records_with_contacts_are_shown() -> None:
     told = {"contacts": "3", "slide_mean_mm": "0.05", "slide_max_mm": "0.1"}
     lines = list(figure_lines(told | {"shell_mean_cm": "0.25"}))
-    assert lines[-2:] == ["contacts of feet: 3", "they slide 0.05 mm on average, at most 0.1 mm"]
+    assert lines[-2:] == ["contacts of feet: 3", "feet slide 0.05 mm on average, at most 0.1 mm"]
     assert lines[-3].split() == ["shell_mean", "0.25"]
 
 

@@ -42,7 +42,7 @@ def test_a_folder_is_packed_and_a_file_encoded(folder: Path, call: Call) -> None
     code, _, errors = call("encode", "my takes")
     assert (code, errors) == (1, "mcz: my takes: is a folder: mcz pack 'my takes' OUT.mcz\n")
     code, _, errors = call("pack", "walk.bvh", "x.mcz")
-    assert (code, errors) == (2, "mcz: walk.bvh: is a file: mcz encode walk.bvh\n")
+    assert (code, errors) == (2, "mcz: walk.bvh: it is a file, not a folder; use mcz encode walk.bvh\n")
 
 
 INTO = [
@@ -241,13 +241,13 @@ def test_what_of_a_folder_is_not_kept_is_said(folder: Path, call: Call) -> None:
     said = {
         "empty folders: none/at all",
         "modes of executable files: walk.bvh",
-        "times of files that are no clips: walk.asf",
+        "times of files that are not clips: walk.asf",
     }
     code, _, errors = call("pack", "takes", "t.mcz", "--mtimes")
     assert code == 0
     assert {text.removeprefix("mcz: left out: ") for text in errors.splitlines()} == said
     code, _, errors = call("unpack", "t.mcz", "out", "--mtimes")
-    assert (code, errors) == (0, "mcz: left out: times of files that are no clips: walk.asf\n")
+    assert (code, errors) == (0, "mcz: left out: times of files that are not clips: walk.asf\n")
     for name in ("walk.bvh", "walk.amc"):
         assert Path("out", name).stat().st_mtime_ns == Path("takes", name).stat().st_mtime_ns
     report = mcz.pack("takes", "u.mcz")
@@ -305,7 +305,7 @@ def test_answers_to_wrong_words_name_the_right_ones(folder: Path, call: Call) ->
             "not an MCZ file: it begins with 'HIERARCH'; encode a source file with mcz encode",
         ),
         (("unpack", "walk.bvh", "out"), "; encode a source file with mcz encode"),
-        (("encode", "all.mcz"), "all.mcz: is an .mcz already; mcz append adds it to another"),
+        (("encode", "all.mcz"), "all.mcz: it is an .mcz already; to add it to another, use mcz append"),
     ):
         code, out, errors = call(*words)
         assert code in (1, 2) and not out and errors.count("\n") == 1

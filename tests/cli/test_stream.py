@@ -390,7 +390,7 @@ def test_nobody_holds_the_others_up(monkeypatch: pytest.MonkeyPatch, capsys) -> 
                 left -= len(data)
         listener.close()
         assert quick.recv(10) == b""
-    assert "behind, and is dropped" in capsys.readouterr().err
+    assert "behind, and was disconnected" in capsys.readouterr().err
     with pytest.raises(OSError):
         socket.create_connection(where)
 
@@ -537,7 +537,7 @@ def test_what_the_wire_takes_is_said(tmp_path: Path) -> None:
     _, _, errors = run("decode", data=out)
     assert f"{sent:.2f} kbit/s received, " in errors
     code, _, errors = run("encode", "--rate", "240", "--param", "bitrate=4", data=data * 1)
-    assert (code, "4 kbit/s cannot be held: packets, " in errors) == (0, True)
+    assert (code, "4 kbit/s cannot be kept: packets, " in errors) == (0, True)
 
 
 # Rows, without a process -----------------------------------------------------------

@@ -45,7 +45,7 @@ def test_who_does_not_gets_nothing(sent: bytes, capsys: pytest.CaptureFixture[st
             with suppress(ConnectionResetError):  # what it sent was not read to its end
                 assert connection.recv(100) == b""
         assert listener._clients == []
-    assert "did not send the token, and is dropped" in capsys.readouterr().err
+    assert "did not send the token, and was disconnected" in capsys.readouterr().err
 
 
 def test_a_silent_client_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,7 +77,7 @@ def test_a_token_to_one_who_asks_for_none() -> None:
 
 @pytest.mark.parametrize("token", ["", "two words", "x" * 201, "ä", "a\nb"])
 def test_what_is_no_token(token: str) -> None:
-    with pytest.raises(Failure, match="a token has 1 to 200"):
+    with pytest.raises(Failure, match="a token must have 1 to 200"):
         tcp.line_of(token)
 
 

@@ -343,7 +343,7 @@ def model_file(path: Path, n_shapes: int) -> np.ndarray:
 
 def test_joints_that_all_lie_at_the_root_are_not_shown_without_a_word(tmp_path: Path) -> None:
     """Pictures and files of other formats would look fine and mean nothing."""
-    said = "no bone has a length: all joints lie where the root is, until rest offsets are given"
+    said = "no bone has a length: all joints lie at the root until rest offsets are set"
     body = back(save_npz(poses=floats(5, 72), trans=floats(5, 3)))
     for to in ("bvh", "c3d", "glb", "trc"):
         assert mcz.left_out(body, to)[0] == said
@@ -353,7 +353,7 @@ def test_joints_that_all_lie_at_the_root_are_not_shown_without_a_word(tmp_path: 
     shaped = mcz.with_offsets(body, offsets)
     comparison = mcz.compare(body, shaped)
     assert comparison.mse == 0 and comparison.max_position_error is None
-    assert "no bone has a length, but on the other side: no positions" in comparison.notes[-1]
+    assert "no bone has a length, unlike on the other side: no positions" in comparison.notes[-1]
     assert said not in (*mcz.left_out(shaped, "bvh"), *mcz.render(shaped, tmp_path / "b.svg").notes)
 
 

@@ -30,13 +30,13 @@ def test_content_counts(name: str, suffix: str, tmp_path: Path) -> None:
     found = format_of(path, data)
     assert own or found.suffixes == FORMATS[name].suffixes or found.name in ("sto", "mot")
     written = mcz.encode(path, tmp_path / "take.mcz", skeleton="none")
-    said = any("though its suffix is" in note for note in written.notes)
+    said = any("but its suffix is" in note for note in written.notes)
     assert said != own, written.notes
     with mcz.open(tmp_path / "take.mcz") as file:
         clip = file.only_clip()
         assert clip.source is not None and clip.source_bytes() == data
         assert own or clip.source.format in (name, "sto")
-        assert ("though its suffix is" in clip.metadata.get("source-note", "")) != own
+        assert ("but its suffix is" in clip.metadata.get("source-note", "")) != own
 
 
 def test_every_way_in(tmp_path: Path, samples: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -46,15 +46,15 @@ def test_every_way_in(tmp_path: Path, samples: Path, capsys: pytest.CaptureFixtu
     motion = mcz.read(path)
     assert motion.source is not None and motion.source.format == "bvh"
     assert run("info", path) == 0
-    assert "its content is BVH, though its suffix is .c3d" in capsys.readouterr().out
+    assert "its content is BVH, but its suffix is .c3d" in capsys.readouterr().out
     assert run("diff", path, samples / "walk.bvh") == 0
     assert run("pack", tmp_path, tmp_path / "p.mcz") == 0
-    assert "its content is BVH, though its suffix is .c3d" in capsys.readouterr().err
+    assert "its content is BVH, but its suffix is .c3d" in capsys.readouterr().err
     (tmp_path / "s").mkdir()
     (tmp_path / "s" / "walk.bvh").write_bytes((samples / "walk.asf").read_bytes())
     assert mcz.read_skeleton(tmp_path / "s" / "walk.bvh").n_joints == 31
     written = mcz.encode(tmp_path / "s" / "walk.bvh", tmp_path / "s.mcz")
-    assert written.notes == ("its content is ASF, though its suffix is .bvh",)
+    assert written.notes == ("its content is ASF, but its suffix is .bvh",)
 
 
 def test_an_acclaim_take_by_its_content(tmp_path: Path, samples: Path) -> None:

@@ -278,7 +278,7 @@ def test_what_is_written_has_a_suffix_of_its_kind(call: Call, tmp_path: Path) ->
     assert call("view", "walk.bvh", "-o", tmp_path / "film.mp4") == (
         2,
         "",
-        f"mcz: {tmp_path / 'film.mp4'}: a page is a .html; mcz render draws films\n",
+        f"mcz: {tmp_path / 'film.mp4'}: a page must be an .html; for films, use mcz render\n",
     )
     code, _, said = call("view", tmp_path / "missing.mcz", "-o", tmp_path / "take.rrd")
     assert code != 2 and "missing.mcz" in said  # an .rrd is for rerun

@@ -193,7 +193,7 @@ def test_an_input_is_no_page(samples: Path, tmp_path: Path, call: Call) -> None:
     assert (code, "the output is the input itself" in errors) == (2, True)
     for other in ("walk.bvh", "walk.mp4"):
         code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / other, "--force")
-        assert (code, "a page is a .html" in errors) == (2, True)
+        assert (code, "a page must be an .html" in errors) == (2, True)
     assert (tmp_path / "walk.bvh").read_bytes() == before
 
 

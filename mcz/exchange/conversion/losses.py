@@ -45,7 +45,7 @@ def left_out(motion: Motion, to: str) -> tuple[str, ...]:
 
 def _left_out(motion: Motion, to: str) -> Iterator[str]:
     if to in SHAPED and has_no_lengths(motion.skeleton):
-        yield f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
+        yield f"{NO_LENGTHS}: all joints lie at the root until rest offsets are set"
     known = HELD_ROLES.get(to, ())
     others = [s.name for s in motion.signals[1:] if s.role not in (TIMES, *known)]
     if others:

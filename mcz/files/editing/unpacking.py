@@ -178,7 +178,7 @@ def unpack(
                 if progress is not None:
                     progress(done + 1, len(stored), one.path)
         if timeless:
-            report.left_out.append(f"times of files that are no clips: {list_some(timeless)}")
+            report.left_out.append(f"times of files that are not clips: {list_some(timeless)}")
         report.outcomes += _fileless_outcomes(chosen_clips)
     return report
 

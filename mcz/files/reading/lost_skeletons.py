@@ -115,7 +115,7 @@ def _restore(
         id_ = chunk_id(ChunkType.SKEL, payload)
         if id_ in lost:  # SALV-09
             container.add_shared(ChunkType.SKEL, payload)
-            container.damage.append(f"SKEL {id_.hex()} is lost; it is made again from {origin}")
+            container.damage.append(f"SKEL {id_.hex()} is lost; it is rebuilt from {origin}")
             lost.remove(id_)
 
 

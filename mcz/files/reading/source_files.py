@@ -41,7 +41,7 @@ def content_note(path: str | os.PathLike[str], source_format: Format) -> str:
     suffix = Path(path).suffix.lower()
     if suffix in source_format.suffixes:
         return ""
-    return f"its content is {source_format.suffix[1:].upper()}, though its suffix is {suffix}"
+    return f"its content is {source_format.suffix[1:].upper()}, but its suffix is {suffix}"
 
 
 def read_source(

@@ -188,7 +188,7 @@ def rate_notes(stated: Fraction | None, options: SourceOptions) -> Iterator[str]
     if abs(float(stated) / asked - 1) <= SAME_RATE:
         return
     if options.force_rate:
-        yield f"its {float(stated):g} frames a second are kept as {asked:g}, as was asked for"
+        yield (f"its {float(stated):g} frames a second are replaced by {asked:g}, as requested")
     else:
         text = f"it states {float(stated):g} frames a second, {asked:g} are asked for"
         yield Remark(text, Hint.FORCE_RATE)

@@ -27,7 +27,8 @@ def common_unit(a: Skeleton, b: Skeleton, notes: list[str]) -> tuple[Number, flo
     else:
         notes.append(
             Remark(
-                "one side does not say its length unit: taken as the other's, no figures in cm",
+                "one side does not state its length unit; that of the other is used, "
+                "and there are no figures in cm",
                 Hint.UNIT,
             )
         )
@@ -80,15 +81,15 @@ def same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
         return False
     without = [m for m in (original, decoded) if has_no_lengths(m.skeleton)]
     if len(without) == 1:
-        notes.append(f"{without[0].name!r}: {NO_LENGTHS}, but on the other side: no positions")
+        notes.append(f"{without[0].name!r}: {NO_LENGTHS}, unlike on the other side: no positions")
         return False
     pairs = zip(point_names(original.skeleton), point_names(decoded.skeleton), strict=False)
     apart = [pair for pair in pairs if pair[0] != pair[1]]
     if apart:
         first = " and ".join(map(repr, apart[0]))
         notes.append(
-            f"points are compared in order, and {len(apart)} of {counts[0]} have other names on "
-            f"the other side, first {first}"
+            f"points are compared in order; {len(apart)} of {counts[0]} have other "
+            f"names on the other side, first {first}"
         )
     return True
 

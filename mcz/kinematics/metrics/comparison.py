@@ -143,7 +143,7 @@ def _further_signals(original: Motion, decoded: Motion, notes: list[str]) -> dic
     for name in dict.fromkeys([*left, *right]):
         a, b = left.get(name), right.get(name)
         if a is None or b is None or a.values.shape != b.values.shape:
-            notes.append(f"signal {name!r} is not in both, or of another shape")
+            notes.append(f"signal {name!r} is not in both, or has another shape")
             continue
         figures[name] = signal_errors(original.skeleton, a, b).mse
     return figures

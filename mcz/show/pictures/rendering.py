@@ -105,9 +105,7 @@ def render(
     look = Look(view, theme_of(theme), check_size(size), follow)
     notes: list[str] = []
     if has_no_lengths(moving.skeleton):
-        notes.append(
-            f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
-        )
+        notes.append(f"{NO_LENGTHS}: all joints lie at the root until rest offsets are set")
     timeline = _timeline(moving, rate)
     first, stop = frame_range(moving, frames)
     if first == stop:
@@ -258,7 +256,7 @@ class _Job:
     ) -> Stage:
         track = track_of(self.moving, frames, *self.facts)
         if track.up_assumed:
-            self.notes.append(Remark(f"its up axis is unknown: {track.up} up assumed", Hint.UP))
+            self.notes.append(Remark(f"its up axis is unknown; {track.up} is assumed", Hint.UP))
         if port is None:
             port = Viewport(0, 0.06 * height, width, 0.87 * height)
         follow = self.look.follow if follow is None else follow

@@ -81,10 +81,10 @@ class Handler(BaseHTTPRequestHandler):
     def _route(self) -> str:
         """Path below the token; raises Refused for a request without it."""
         if self.request_version not in ("HTTP/1.0", "HTTP/1.1"):
-            raise Refused(505, "HTTP/1.1 is spoken here")
+            raise Refused(505, "the server requires HTTP/1.1")
         check_sender(self.headers, self._site.port)
         if self.command != "POST" and self.headers.get("Content-Length", "0") != "0":
-            raise Refused(400, "a request for something posts nothing")
+            raise Refused(400, "a GET request must have no body")
         before, *below = self.path.partition("?")[0].split("/", 2)
         token = below[0] if below else ""
         known = compare_digest(token.encode("utf-8", "replace"), self._site.token.encode())
@@ -184,7 +184,7 @@ class Handler(BaseHTTPRequestHandler):
         if path not in tasks:
             raise Refused(404, "there is nothing here")
         if self.headers.get_content_type() != JSON:
-            raise Refused(415, "requests are posted as application/json")
+            raise Refused(415, "requests must be posted as application/json")
         data = self.rfile.read(length_of(self.headers, LONGEST_JSON))
         self._unread = False
         document = json_of(data)

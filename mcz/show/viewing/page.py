@@ -85,7 +85,7 @@ def build_page(say: Callable[[str], None], root: Path = ROOT) -> Path:
     npm, node = shutil.which("npm"), shutil.which("node")
     if npm is None or node is None:
         if page.is_file():
-            say(f"{page} is older than its sources, and npm, which would build it, is not here")
+            say(f"{page} is older than its sources, and npm is not installed to rebuild it")
             return page
         raise AccessError(f"the page of the viewer is not built: install Node.js, then {COMMAND}")
     _build(folder, npm, node, say)
@@ -112,7 +112,7 @@ def _build(folder: Path, npm: str, node: str, say: Callable[[str], None]) -> Non
             raise AccessError("another process is building the page; try again soon", path=folder)
         packages = folder / "node_modules" / ".package-lock.json"
         if not packages.is_file() or _is_older(packages, iter([folder / "package-lock.json"])):
-            say(f"fetching the build tools of the page, once: npm ci in {folder}")
+            say(f"fetching the build tools of the page (once): npm ci in {folder}")
             _run([npm, *INSTALL], folder)
         say("building the page: node build.mjs")
         _run([node, "build.mjs"], folder)

@@ -97,11 +97,13 @@ def length_of(headers: Headers, most: int) -> int:
     """The number of posted bytes; raises Refused if it is not stated, or too large."""
     lengths = headers.get_all("Content-Length", [])
     if headers.get("Transfer-Encoding") is not None or len(lengths) != 1:
-        raise Refused(411, "the request must say its Content-Length")
+        raise Refused(411, "the request must state its Content-Length")
     if not re.fullmatch(r"[0-9]{1,15}", lengths[0]):
         raise Refused(400, "Content-Length is not a number")
     if int(lengths[0]) > most:
-        raise Refused(413, f"the request has {int(lengths[0]):,} bytes, at most {most:,} are taken")
+        raise Refused(
+            413, f"the request has {int(lengths[0]):,} bytes; at most {most:,} are accepted"
+        )
     return int(lengths[0])
 
 
@@ -110,9 +112,9 @@ def json_of(data: bytes) -> JsonObject:
     try:
         document = json.loads(data)
     except (ValueError, RecursionError):
-        raise Refused(400, "the request is not JSON") from None
+        raise Refused(400, "the request is not valid JSON") from None
     if not isinstance(document, dict):
-        raise Refused(400, "the request is not an object of JSON")
+        raise Refused(400, "the request must be a JSON object")
     return document
 
 
@@ -120,7 +122,7 @@ def text_of(document: Params, key: str) -> str:
     """A text of an object; raises Refused for another type."""
     value = document.get(key)
     if not isinstance(value, str) or not value:
-        raise Refused(400, f"{key} is not a text")
+        raise Refused(400, f"{key} must be a string")
     return value
 
 
@@ -128,7 +130,7 @@ def object_of(document: Params, key: str) -> JsonObject:
     """An object in an object; raises Refused for another type."""
     value = document.get(key)
     if not isinstance(value, dict):
-        raise Refused(400, f"{key} is not an object")
+        raise Refused(400, f"{key} must be an object")
     return value
 
 
@@ -136,11 +138,11 @@ def params_of(document: Params) -> JsonObject:
     """The parameters of a codec by name: texts, numbers and truths, no null; raises Refused."""
     given = document.get("params") or {}
     if not isinstance(given, dict) or len(given) > MOST_PARAMS:
-        raise Refused(400, "params is not an object of parameters")
+        raise Refused(400, "params must be an object of parameters")
     params = {key: value for key, value in given.items() if value is not None}
     for key, value in params.items():
         if not isinstance(value, str | int | float | bool):
-            raise Refused(400, f"the parameter {key[:40]!r} is neither a text nor a number")
+            raise Refused(400, f"parameter {key[:40]!r} must be a string or a number")
     return params
 
 
@@ -157,7 +159,7 @@ def boundary_of(content_type: str) -> bytes:
     """Boundary between the parts of a form; raises Refused for any other content."""
     match = BOUNDARY.fullmatch(content_type)
     if match is None:
-        raise Refused(415, "files are taken as multipart/form-data")
+        raise Refused(415, "files must be posted as multipart/form-data")
     return match[2].encode()
 
 
@@ -176,7 +178,7 @@ def save_files(stream: Readable, size: int, boundary: bytes, folder: Path) -> li
         if after == b"--":
             return paths
         if after != b"\r\n":
-            raise Refused(400, "the form has a boundary that is followed by something else")
+            raise Refused(400, "a boundary of the form is followed by something else")
         name = FILE_NAME.search(body.head())
         if name is None or not name[1]:
             for _ in body.until_delimiter():
@@ -192,7 +194,7 @@ def _save(body: _Body, folder: Path, name: str) -> Path:
     try:
         stream = path.open("xb")
     except OSError:  # a file or folder of that name exists
-        raise Refused(400, "two files of the form have one name") from None
+        raise Refused(400, "two files of the form have the same name") from None
     with stream:
         for piece in body.until_delimiter():
             stream.write(piece)
@@ -226,7 +228,7 @@ class _Body:
         """Read another piece; raises Refused at the end of the form."""
         piece = self._stream.read(min(PIECE, self._left)) if self._left else b""
         if not piece:
-            raise Refused(400, "the form ends in a part")
+            raise Refused(400, "the form is truncated within a part")
         self._left -= len(piece)
         self._held += piece
 

@@ -59,7 +59,7 @@ class ServerTasks:
     def turn(self, is_gone: Callable[[], bool] = lambda: False) -> Iterator[None]:
         """Wait for a turn; Refused if too many wait, or the client has left."""
         if not self._waiting.acquire(blocking=False):
-            raise Refused(503, "too much is asked for at once")
+            raise Refused(503, "too many requests are waiting")
         try:
             with self._turn:
                 if is_gone():
@@ -98,7 +98,7 @@ class ServerTasks:
             with self.turn():
                 return self._converted(folder, paths)
         except OSError as error:
-            raise Refused(507, f"the files could not be kept: {error.strerror}") from None
+            raise Refused(507, f"cannot store the files: {error.strerror}") from None
         except MczError as error:
             if error.path is not None:
                 error.path = error.path.removeprefix(f"{folder}{os.sep}")  # a private path
@@ -194,12 +194,14 @@ class ServerTasks:
         with mcz_open(self._file(asked).target(), salvage=self._registry.salvage) as file:
             if isinstance(clip_key, int) and not isinstance(clip_key, bool):
                 if not 0 <= clip_key < len(file):
-                    raise Refused(404, f"the file has {len(file)} clips, not {clip_key}")
+                    raise Refused(
+                        404, f"the file has {len(file)} clips, so there is no clip {clip_key}"
+                    )
                 yield file, next(islice(file, clip_key, None))
             elif clip_key is None or isinstance(clip_key, str):
                 yield file, file.only_clip(clip_key or None)
             else:
-                raise Refused(400, "clip is neither a name nor a number")
+                raise Refused(400, "clip must be a name or a number")
 
     def _motion(self, asked: Params) -> Motion:
         """The motion of a clip; the last decoded ones are cached."""

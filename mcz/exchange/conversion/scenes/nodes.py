@@ -160,7 +160,7 @@ def _codes(timeline: Timeline, rate: Fraction) -> Floats:
 def _notes(motion: Motion) -> Iterator[str]:
     skeleton = motion.skeleton
     if skeleton.unit_cm is None:
-        yield "its length unit is unknown: a unit became a meter"
+        yield "its length unit is unknown; one unit becomes a meter"
     if not skeleton.up_axis:
         yield "the axis that points up is unknown: taken for y"
     yield from left_out(motion, "glb")
