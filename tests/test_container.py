@@ -59,7 +59,9 @@ def test_salvage_takes_nothing_of_another_version_for_its_own() -> None:
     """A file of 0.9 is refused where HEAD is whole; its clips where HEAD is not."""
     data = (VECTORS / "uncommon/container/format-0-9.mcz").read_bytes()
     for salvage in (False, True):
-        with pytest.raises(UnsupportedError, match=r"needs format 0\.9, .* read it with version 0.9 of mcz"):
+        with pytest.raises(
+            UnsupportedError, match=r"needs format 0\.9, .* read it with version 0.9 of mcz"
+        ):
             mcz.open(data, salvage=salvage)
     head = data.index(b"HEAD") + HEADER.size
     with mcz.open(data[:head] + b"\1" + data[head + 1 :], salvage=True) as file:

@@ -147,7 +147,9 @@ def test_what_is_sound_is_kept(archive_bytes: bytes) -> None:
         other = build_chunk(ChunkType.COPY, build_copies(lie, copy.offset), ChunkFlag.ANCILLARY)
         bad = archive_bytes[: copy.offset] + other + archive_bytes[copy.offset + copy.size :]
         with mcz.open(bad, salvage=True) as file:
-            assert any("is not used, because the original is intact" in line for line in file.damage)
+            assert any(
+                "is not used, because the original is intact" in line for line in file.damage
+            )
             assert not any("copy is used" in line for line in file.damage)
         assert content(bad, salvage=True) == content(archive_bytes)
         with pytest.raises(FormatError):

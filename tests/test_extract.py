@@ -470,7 +470,7 @@ def test_resolution_beside_a_signal_without_any() -> None:
     write_clip(writer, replace(motion, signals=motion.signals[:1]), overlap_codec.CODEC, {})
     write_clip(writer, replace(motion, name="raw"), codecs.codec_by_name("raw"), {})
     writer.finish()
-    with pytest.raises(mcz.OptionError, match="clip 'raw': the 1 finest"):
+    with pytest.raises(mcz.OptionError, match="clip 'raw': cannot leave out the 1 finest"):
         extract_clips(out.getvalue(), resolution=1)
     found = mcz.extract(out.getvalue(), io.BytesIO(), resolution=1, clip="smooth")
     assert found.clips[0].data_bytes < 0.6 * found.clips[0].data_bytes_before

@@ -175,7 +175,7 @@ def test_skeletons_of_one_name(tmp_path: Path) -> None:
     other.write_bytes((tmp_path / "walk.asf").read_bytes() + b"# another\n")
     path = tmp_path / "a.mcz"
     mcz.encode(tmp_path / "walk.amc", path)
-    with pytest.raises(mcz.SourceError, match=r"another 'walk\.asf'"):
+    with pytest.raises(mcz.SourceError, match=r"source file 'walk\.asf'"):
         mcz.append([other], path)
     assert results(mcz.append([tmp_path / "walk.asf"], path)) == {"walk.asf": "present"}
     mcz.append([other], path, root=tmp_path)

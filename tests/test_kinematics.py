@@ -210,7 +210,7 @@ def test_virtual_markers_see_a_roll_that_points_do_not() -> None:
 
 
 def test_virtual_markers_need_a_unit() -> None:
-    with pytest.raises(OptionError, match="unit is unknown"):
+    with pytest.raises(OptionError, match="unit .*is unknown"):
         virtual_markers_of(WALKS["bvh"].skeleton, WALKS["bvh"].values)
 
 
@@ -234,7 +234,7 @@ def test_sensitivities_of_the_walk() -> None:
     assert found[:3].tolist() == [1.0, 1.0, 1.0]  # every point moves by as much as the root
     few = sensitivities(skeleton, values, max_frames=40)
     assert np.abs(few / found - 1).max() < 0.1
-    with pytest.raises(OptionError, match="max_frames 0"):
+    with pytest.raises(OptionError, match="max_frames is 0"):
         sensitivities(skeleton, values, max_frames=0)
     assert sensitivities(skeleton, values[:0]).tolist() == [0.0] * 62
 

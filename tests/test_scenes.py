@@ -220,7 +220,7 @@ def test_short_clips(kind: str, n_frames: int) -> None:
 
 
 def test_odd_names_are_text() -> None:
-    with pytest.raises(mcz.MotionError, match="not text that UTF-8 can hold"):
+    with pytest.raises(mcz.MotionError, match="must be text that UTF-8 can hold"):
         Joint("\ud800")
     joint = Joint('a"\\\n\x00é')
     motion = Motion(Skeleton((joint,)), (Signal(np.zeros((2, 0))),), Fraction(1), name="</script>")

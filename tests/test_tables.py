@@ -126,7 +126,7 @@ def test_xarray(samples: Path) -> None:
     assert data.time.values[120] == 1.0 and data.time.attrs["units"] == "s"
     assert data.positions.attrs["units"] == "m" and data.attrs["frame_rate_exact"] == "120"
     assert all(isinstance(value, (str, int, float)) for value in data.attrs.values())
-    with pytest.raises(mcz.OptionError, match="'matrix': one of quat"):
+    with pytest.raises(mcz.OptionError, match="'matrix'; known are quat"):
         mcz.to_xarray(motion, form="matrix")
     markers = mcz.to_xarray(mcz.read(samples / "walk.c3d"))
     assert markers.residuals.dims == ("time_residuals", "channel_residuals")

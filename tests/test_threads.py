@@ -76,9 +76,9 @@ def test_how_many_threads_there_are() -> None:
         with limit_threads(1):
             assert thread_limit() == 1
     assert thread_limit() == usual
-    with pytest.raises(OptionError, match="threads: 0"):
+    with pytest.raises(OptionError, match="threads is 0"):
         mcz.open(b"", threads=0)
-    with pytest.raises(OptionError, match="threads: -1"):
+    with pytest.raises(OptionError, match="threads is -1"):
         mcz.write(MOTION, io.BytesIO(), threads=-1)
 
 

@@ -293,7 +293,7 @@ def test_kinds_of_vectors() -> None:
     # A transform of whole windows keeps every sum of squares.
     every = window_coefficients(found, 120, 120)
     assert (every**2).sum() == pytest.approx((clip**2).sum())
-    with pytest.raises(OptionError, match="not one of frames, steps, windows"):
+    with pytest.raises(OptionError, match="must be one of frames, steps, windows"):
         Recipe(kind="poses").vectors(found)
     with pytest.raises(OptionError, match="long enough"):
         Recipe(kind="steps").vectors(replace(found, clips=(clip[:8],)))

@@ -123,7 +123,7 @@ FORMAT_NAME = f"{FORMAT[0]}.{FORMAT[1]}"
 
 def _check_version(needs_minor: int, record: Container) -> bool:
     needed = record.needs_major, needs_minor  # HEAD-04
-    words = f"it needs format {needed[0]}.{needed[1]}, this reader knows {FORMAT_NAME}"
+    words = f"it needs format {needed[0]}.{needed[1]}, but this reader knows {FORMAT_NAME}"
     if needed > FORMAT:  # HEAD-01, CLIP-23
         raise UnsupportedError(words)
     if not needed[0] and needed != FORMAT:  # HEAD-03

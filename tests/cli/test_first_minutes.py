@@ -42,7 +42,10 @@ def test_a_folder_is_packed_and_a_file_encoded(folder: Path, call: Call) -> None
     code, _, errors = call("encode", "my takes")
     assert (code, errors) == (1, "mcz: my takes: is a folder: mcz pack 'my takes' OUT.mcz\n")
     code, _, errors = call("pack", "walk.bvh", "x.mcz")
-    assert (code, errors) == (2, "mcz: walk.bvh: it is a file, not a folder; use mcz encode walk.bvh\n")
+    assert (code, errors) == (
+        2,
+        "mcz: walk.bvh: it is a file, not a folder; use mcz encode walk.bvh\n",
+    )
 
 
 INTO = [
@@ -305,7 +308,10 @@ def test_answers_to_wrong_words_name_the_right_ones(folder: Path, call: Call) ->
             "not an MCZ file: it begins with 'HIERARCH'; encode a source file with mcz encode",
         ),
         (("unpack", "walk.bvh", "out"), "; encode a source file with mcz encode"),
-        (("encode", "all.mcz"), "all.mcz: it is an .mcz already; to add it to another, use mcz append"),
+        (
+            ("encode", "all.mcz"),
+            "all.mcz: it is an .mcz already; to add it to another, use mcz append",
+        ),
     ):
         code, out, errors = call(*words)
         assert code in (1, 2) and not out and errors.count("\n") == 1

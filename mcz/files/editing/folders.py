@@ -297,7 +297,7 @@ def dropped_facts(root: Path, packed: Sequence[Path], *, with_times: bool) -> It
         yield from some("modes of executable files", filter(_is_executable, packed))
     if with_times:
         others = (p for p in packed if p.suffix.lower() == ".asf" or not _is_motion(p))
-        yield from some("times of files that are no clips", others)
+        yield from some("times of files that are not clips", others)
 
 
 def _is_executable(path: Path) -> bool:
