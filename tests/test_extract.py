@@ -491,7 +491,7 @@ def test_motion_at_a_resolution() -> None:
         assert thin.frame_numbers is not None
         assert list(thin.frame_numbers) == list(range(7, 43, 2))
         assert thin.frame_rate == 60
-        with pytest.raises(mcz.OptionError, match="no resolution 2: it has 0 to 1"):
+        with pytest.raises(mcz.OptionError, match="no resolution 2: it has resolutions 0 to 1"):
             clip.motion(resolution=2)
 
 

@@ -271,7 +271,7 @@ def test_any_text_parses_or_is_refused(text: str) -> None:
     try:
         query = Query(text)
     except OptionError as error:
-        assert re.match(r"where: (column \d+: |the text is empty)", str(error))
+        assert re.match(r"where: (column \d+: |the query is empty)", str(error))
         return
     assert repr(Query(str(query)).tree) == repr(query.tree)
 

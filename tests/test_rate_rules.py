@@ -150,7 +150,7 @@ def test_force_rate_on_the_command_line(
     arguments = [command, str(folder), str(target), "--rate", "120"]
     arguments += ["--force"] if command == "pack" else []
     assert run(cli, "mcz", arguments) == 0
-    assert "120 are asked for; --force-rate takes" in capsys.readouterr().err
+    assert "120 are asked for; --force-rate overrides it" in capsys.readouterr().err
     with mcz.open(target) as file:
         assert [clip.frame_rate for clip in file] == [60]
 

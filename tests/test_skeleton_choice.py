@@ -119,7 +119,7 @@ def test_refused(tmp_path: Path, amc: str, asfs: dict[str, str], words: str) -> 
     with pytest.raises(SourceError) as caught:
         mcz.read(path)
     assert words in str(caught.value)
-    assert "skeleton= names one" in str(caught.value)
+    assert "choose one with skeleton=" in str(caught.value)
     assert all(f"{name}.asf" in str(caught.value) for name in asfs)
 
 
@@ -147,7 +147,7 @@ def test_bones_that_come_late(tmp_path: Path) -> None:
     """The whole file counts, not its first frame alone."""
     path = put_files(tmp_path, "walk", walk="fits")
     path.write_bytes(AMC + b"3\nroot 0 0 0 0 0 0\nspine 1 2\nprop 7\n")
-    with pytest.raises(SourceError, match=r"lacks prop; skeleton="):
+    with pytest.raises(SourceError, match=r"lacks prop; choose one with skeleton="):
         mcz.read(path)
     motion, decoded = read(path, skeleton=tmp_path / "walk.asf")
     assert "lacks prop; they are scalars without kinematics" in decoded[0]

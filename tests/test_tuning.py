@@ -170,7 +170,7 @@ def test_the_command_line_takes_targets(tmp_path: Path, samples: Path) -> None:
         ({"unit_cm": None}, {"max_error_cm": 1}, "max_error_cm has no meaning: the length unit"),
         ({"n_frames": 0}, {"max_error_cm": 1}, "max_error_cm has no meaning"),
         ({}, {"target_bytes": 999, "kbps": 1}, "target_bytes and kbps exclude each other"),
-        ({}, {"max_error_cm": 1, "mean_error_cm": 1}, "mean_error_cm and max_error_cm are asked"),
+        ({}, {"max_error_cm": 1, "mean_error_cm": 1}, "mean_error_cm and max_error_cm exclude"),
         ({}, {"target_bytes": 999, "T_g": 1}, "target_bytes and T_g exclude each other"),
         ({}, {"mean_error_cm": 1, "T_g": 0, "Q": 1}, "mean_error_cm and T_g exclude each other"),
         ({}, {"target_bytes": 10}, "target_bytes 10 cannot be met: T_g 1.04858e.06 gives"),

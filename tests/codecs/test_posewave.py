@@ -123,7 +123,10 @@ def test_unknown_units_have_steps_in_their_own() -> None:
     [
         ({"max_error_cm": 1e-9}, "exceeds 2.29 quantizer steps"),
         ({"target_bytes": 10}, r"target_bytes 10 cannot be met: step 1e\+09 gives"),
-        ({"step": 1, "weights": 1}, "has no parameter 'weights'; it has preset, step, levels, con"),
+        (
+            {"step": 1, "weights": 1},
+            "has no parameter 'weights'; its parameters are preset, step, levels, con",
+        ),
         ({"step": 1, "refinement": 1}, "has no parameter 'refinement'"),
         (
             {"step": 1, "quality": "nobdy=1mm"},

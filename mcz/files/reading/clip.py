@@ -173,9 +173,10 @@ class Clip(StoredClip):
         return self.signals[signal]
 
     def _check_resolution(self, info: SignalInfo, resolution: int) -> None:
-        if not 0 <= resolution < info.counts.n_resolutions:
+        last = info.counts.n_resolutions - 1
+        if not 0 <= resolution <= last:
             raise OptionError(
-                f"no resolution {resolution}: it has 0 to {info.counts.n_resolutions - 1}",
+                f"no resolution {resolution}: it has resolutions 0 to {last}",
                 clip=self.name,
             )
 
