@@ -50,7 +50,7 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
     others = [s.name for s in motion.signals[1:] if s.role not in (TIMES, *known)]
     if others:
         yield f"left out: signal {', '.join(others)}"
-    yield from text_columns(motion.metadata)
+    yield from text_column_note(motion.metadata)
     names = [channel.label for channel in motion.skeleton.channels if not channel.kind]
     if names and to in (*POINTS, *SCENES) and point_set(motion.skeleton) != "markers":
         more = " ..." if len(names) > MOST_NAMES else ""
