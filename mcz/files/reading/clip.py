@@ -379,8 +379,7 @@ class Clip(StoredClip):
         """The source file, byte for byte (of a lossy clip: like it), or a part of it.
 
         The arguments are those of ``motion``. A changed file states the frame rate of the clip, if
-        its format can. Raises ChecksumError where a lossless clip does not restore its original
-        bytes.
+        its format can. Raises ChecksumError where a lossless clip does not restore its file.
         """
         if (info := self.source) is None:
             raise OptionError("the clip has no source file", clip=self.name, hint=Hint.CONVERT)
