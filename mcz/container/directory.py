@@ -152,7 +152,7 @@ class Index(Record):
     clips: Table[IndexedClip] = field(columns(IndexedClip), "the clips")
     signals: Table[IndexedSignal] = field(columns(IndexedSignal), "the signals of all clips")
     segments: Table[IndexedSegment] = field(columns(IndexedSegment), "the segments of all clips")
-    n_behind: int = field(UVARINT, "the first ancillary chunks, of the last clip of the INDX before")
+    n_behind: int = field(UVARINT, "first ancillary chunks, of the last clip of the INDX before")
     ancillary: Table[IndexedPlace] = field(
         columns(IndexedPlace), "the ancillary chunks of all clips"
     )
