@@ -166,7 +166,7 @@ def test_standard_streams_are_files_too(folder: Path, words: str) -> None:
         check=False,
     )
     assert done.returncode == 2, done.stderr
-    assert b"it is the input itself" in done.stderr
+    assert b"the output is the input itself" in done.stderr
     assert (folder / "walk.bvh").read_bytes() == before
 
 
@@ -375,7 +375,7 @@ def test_replace_counts_exceptions(folder: Path, call: Call) -> None:
     words = (*words, "--values", folder / "v.npz", "--force")
     code, out, _ = call(*words)
     assert code == 0
-    assert "720 numbers of the joint off the grid, 0 before; --on-grid" in out
+    assert "720 numbers of the joint off the grid, 0 before; use --on-grid" in out
     document = json.loads(call(*words, "--json")[1])
     assert (document["n_exceptions"], document["n_exceptions_before"]) == (720, 0)
     grown = (folder / "x.mcz").stat().st_size - (folder / "walk.mcz").stat().st_size

@@ -178,7 +178,7 @@ def test_a_page_that_is_too_large_is_not_written(samples: Path, tmp_path: Path, 
     for words in (("--max-size", 15000), ("--max-size", 500)):
         code, _, errors = call(samples / "walk.bvh", "-o", out, "--force", *words)
         assert code == 1
-        assert "--max-size allows more" in errors
+        assert "allow more bytes (--max-size)" in errors
         assert out.read_bytes() == b"mine"
     code, _, errors = call(samples / "walk.bvh", "-o", out)
     assert (code, "--force" in errors) == (2, True)
