@@ -204,7 +204,11 @@ def deflate_streams() -> None:
 def edit_files(folder: Path) -> None:
     """A text file to the byte, joints of a clip, and a damaged file that is repaired."""
     (folder / "texts").mkdir()
-    (folder / "texts" / "walk.bvh").write_bytes(bvh.write(bvh_walk().cut(0, 24)))
+    text = bvh.write(bvh_walk().cut(0, 24))
+    (folder / "texts" / "walk.bvh").write_bytes(text)
+    *rows, last = text.rstrip().split(b"\n")
+    odd = b"+1.50e+1" + last[last.index(b" ") :]  # a row whose cells are printed one by one
+    (folder / "texts" / "odd.bvh").write_bytes(b"\n".join([*rows, odd, b""]))
     whole, bad = folder / "whole.mcz", folder / "bad.mcz"
     mcz.pack(folder / "texts", whole, profile="large")
     mcz.unpack(whole, folder / "again")
