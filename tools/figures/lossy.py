@@ -7,6 +7,7 @@ them are interpolated in logarithms.
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -20,6 +21,7 @@ import mcz
 from mcz.bench.cases import Case, Variant
 from mcz.bench.ladder import sweep
 from mcz.bench.measure import measure, write_file
+from mcz.files.reading.sizes import clip_sizes
 from tools.figures.lossless import cpu_seconds, read_values
 from tools.figures.table import Table, table
 
@@ -100,8 +102,12 @@ def curve_of(path: Path, codec: str) -> Curve:
 
 def bounded_size(path: Path, most: float) -> int:
     """Bytes with a bound on the greatest distance, in cm."""
-    params = {"max_error_cm": most}
-    return int(measure(Case(str(path)), Variant("posewave"), params)["coded_bytes"])
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder, "bounded.mcz")
+        mcz.encode(path, target, codec="posewave", params={"max_error_cm": most})
+        with mcz.open(target) as file:
+            sizes = clip_sizes(file.container, file.only_clip())
+    return sizes.payload + sizes.overhead + sizes.models
 
 
 def size_at(curve: Curve, key: str, error: float) -> float:
