@@ -370,7 +370,7 @@ def test_records_for_repositories(archive: Path, call: Call) -> None:
     """Properties come from the file, or from what all clips state alike."""
     record, errors = described(archive, call, "datacite")
     assert record["types"]["resourceTypeGeneral"] == "Dataset"
-    assert [line.split("requires ")[1].split(",")[0] for line in errors.splitlines()] == [
+    assert [line.split("requires ")[1].split(";")[0] for line in errors.splitlines()] == [
         "creators",
         "titles",
         "publisher",

@@ -71,7 +71,7 @@ def note_on_height(height: float, unit_cm: float) -> str:
     """The same for a height in length units.
 
     >>> note_on_height(27.5, 2.54)
-    "height 27.5 units = 69.9 cm, which is not human; is 1 unit = 2.54 cm right?"
+    'height 27.5 units = 69.9 cm, which is not human; is 1 unit = 2.54 cm right?'
     >>> note_on_height(27.5, 5.6444)
     ''
     """

@@ -23,9 +23,9 @@ SUFFIXES = {suffix for f in FORMATS.values() for suffix in f.suffixes}
 MALFORMED = "malformed-in-the-wild"
 REFUSED = {
     "no-hierarchy-section.bvh": "line 1: no HIERARCHY section",
-    "empty.c3d": "offset 0: the file ends",
+    "empty.c3d": "offset 0: the file is truncated",
     "zero-filled.c3d": "offset 515: processor 0",
-    "truncated.trc": "line 2: no line that begins with Frame#",
+    "truncated.trc": "line 2: no line begins with Frame#",
 }
 
 

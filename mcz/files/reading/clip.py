@@ -234,13 +234,11 @@ class Clip(StoredClip):
                 raise
             return self.skeleton
 
-    def _motion(
-        self, frames: tuple[int, int] | None, resolution: int, decimate: bool, hashed: bool = True
-    ) -> Motion:
+    def _motion(self, frames: tuple[int, int] | None, resolution: int, decimate: bool) -> Motion:
         start, stop = self.checked_range(frames)
         self._check_resolution(self.signals[0], resolution)
         numbers = self.frame_numbers[start:stop]
-        signals = [self._read_signal(s, start, stop, resolution, hashed) for s in self.signals]
+        signals = [self._read_signal(s, start, stop, resolution) for s in self.signals]
         motion = Motion(
             skeleton=self.skeleton,
             signals=tuple(signals),
@@ -258,13 +256,11 @@ class Clip(StoredClip):
             return motion
         return motion.at_times(self.timeline and self.timeline.cut(slice(start, stop, step)))
 
-    def _read_signal(
-        self, info: SignalInfo, start: int, stop: int, resolution: int, hashed: bool
-    ) -> Signal:
+    def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
         resolution = info.coarser(resolution)
         reader = SignalReader(self.container, info, None, resolution, self.name)
         signal = reader.signal(start + info.skip, stop + info.skip)
-        if hashed and (start, stop, resolution) == (0, self.n_frames, 0):
+        if (start, stop, resolution) == (0, self.n_frames, 0):
             self._check_whole(info, signal.values, signal.mask)
         if info.role == TIMES:
             self._check_times(info, signal.values, signal.mask)
@@ -385,7 +381,7 @@ class Clip(StoredClip):
             raise OptionError("the clip has no source file", clip=self.name, hint=Hint.CONVERT)
         check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
         is_file = self.gives_file(frames, resolution)
-        motion = self._motion(frames, resolution, decimate, hashed=not is_file)
+        motion = self._motion(frames, resolution, decimate)
         if motion.source is None and self.container.salvage:
             raise FormatError(
                 "the source file of the clip is lost", clip=self.name, hint=Hint.CONVERT

@@ -112,11 +112,9 @@ class FilteredClip(Clip):
         filtered = _filter(values, mask, *self._settings)[rows, columns]
         return Masked(filtered, None if mask is None else mask[rows, columns])
 
-    def _read_signal(
-        self, info: SignalInfo, start: int, stop: int, resolution: int, hashed: bool
-    ) -> Signal:
+    def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
         """The positions on the grids of the clip where possible."""
-        signal = super()._read_signal(info, start, stop, resolution, hashed)
+        signal = super()._read_signal(info, start, stop, resolution)
         if info.index:
             return signal
         values, mask = self.read_masked((start, stop), None, resolution)
