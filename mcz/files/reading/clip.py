@@ -6,7 +6,6 @@ import hashlib
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from mcz.container.limits import check_decoded
 from mcz.container.model_records import ValueDigest, value_hash
 from mcz.container.reader import Container
 from mcz.errors import ChecksumError, FormatError, OptionError
+from mcz.files.reading.pose_methods import PoseMethod, method_of
 from mcz.files.reading.signal_info import SignalInfo, groups_of
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.files.reading.source_info import SourceInfo, read_source, sourced_skeleton, stating_rate
@@ -58,31 +58,19 @@ if TYPE_CHECKING:
     from mcz.kinematics.contacts import ContactRule, Contacts
 
 
-class _OfPoses:
-    """A function of ``mcz.kinematics.poses`` as a method of its name, imported on first use."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._owner, self._name = owner, name
-
-    def __get__(self, instance: object, owner: type) -> object:
-        function = getattr(import_module("mcz.kinematics.poses"), self._name)
-        setattr(self._owner, self._name, function)
-        return function.__get__(instance, owner)
-
-
 class Clip(StoredClip):
     """One clip; it is decoded on demand."""
 
     _repr_html_ = html_of
-    if TYPE_CHECKING:  # as of ``mcz``: only needed values are decoded
-        positions = poses.positions
-        rotations = poses.rotations
-        root = poses.root
-        velocities = poses.velocities
-        accelerations = poses.accelerations
+    if TYPE_CHECKING:  # as of ``mcz``
+        positions = method_of(poses.positions)
+        rotations = method_of(poses.rotations)
+        root = method_of(poses.root)
+        velocities = method_of(poses.velocities)
+        accelerations = method_of(poses.accelerations)
     else:
-        positions, rotations, root = _OfPoses(), _OfPoses(), _OfPoses()
-        velocities, accelerations = _OfPoses(), _OfPoses()
+        positions, rotations, root = PoseMethod(), PoseMethod(), PoseMethod()
+        velocities, accelerations = PoseMethod(), PoseMethod()
 
     def __reduce__(self) -> tuple[object, ...]:
         return _reopen, (self.container, self.name)
