@@ -28,7 +28,7 @@ from mcz.sources.tables.layout import (
     parsed_clock,
     with_phrases,
 )
-from mcz.sources.tables.times import frame_rate, frame_time, stated_rate
+from mcz.sources.tables.times import DECIMAL, frame_rate, frame_time, stated_rate
 from mcz.sources.text.layout import MAX_RUNS, Template
 
 HEADER_RATE = 20  # where the header of a C3D has a binary32 of the rate
@@ -64,7 +64,7 @@ def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
     fields = parse(Template, template, WHERE, {"runs": MAX_RUNS})
     parts = [bytes(part) for part in fields.header]
     match = _FRAME_TIME.search(parts[-1]) if parts else None
-    if match is None:
+    if match is None or not DECIMAL.fullmatch(match[1].decode("latin-1")):
         return None
     stated, _ = frame_rate(match[1].decode("latin-1"))
     text = _like(match[1], 1 / rate, lambda text: _is_time_of(text, rate))

@@ -8,7 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mcz.model.schema import build
+from mcz.sources.stated_rates import restate_bvh
 from mcz.sources.tables.times import MAX_TERM, frame_rate, frame_time
+from mcz.sources.text.layout import Template
 
 
 @pytest.mark.parametrize(
@@ -47,3 +50,13 @@ def test_usual_rates_come_back(rate: float) -> None:
     wanted = Fraction(rate).limit_denominator(1001)
     assert frame_rate(frame_time(wanted))[0] == wanted
     assert frame_rate(frame_time(None))[0] is None
+
+
+def test_what_is_no_number_states_no_rate() -> None:
+    """A template of such a header is written as it is."""
+    headers = [[b"Frames: ", f"\nFrame Time:{text}\n".encode()] for text in ("0.01", "!0.01")]
+    templates = [build(Template(header=header, gaps=[], patterns=[]), "") for header in headers]
+    stated, unstated = (restate_bvh(template, Fraction(50)) for template in templates)
+    assert stated is not None
+    assert stated.rate == 100
+    assert unstated is None

@@ -117,7 +117,7 @@ class WaveletDecoder {
     const out = new Float64Array((to - from) * this.nChannels);
 
     const needed = neededRanges(from, to, this.taps, this.levels);
-    if (needed.ends[this.levels] > this.bandEnd(end, this.levels)) {
+    if (this.nChannels > 0 && needed.ends[this.levels] > this.bandEnd(end, this.levels)) {
       throw new Refused(`frames ${from} to ${to - 1} need approximations that are not stored`);
     }
     const streams = new BandStreams(this, segments);
