@@ -279,7 +279,7 @@ with Pool(2) as pool:
 """
 
 
-@pytest.mark.skipif(os.name == "nt", reason="the numbers of frames of its signals differ: POSIX")
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_no_process_stays_behind(number: int) -> None:
     started = subprocess.Popen(

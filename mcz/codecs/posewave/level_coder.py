@@ -10,7 +10,7 @@ from collections.abc import Callable
 from copy import copy, deepcopy
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -21,9 +21,14 @@ from mcz.codecs.transforms import lifting
 from mcz.model.motion import Skeleton
 from mcz.model.types import Bools, Floats, Ints
 
+if TYPE_CHECKING:  # modules of kernels are imported on use
+    from mcz.codecs.posewave.metric_kernels import Course
+    from mcz.codecs.posewave.pose_kernels import Lanes
+
 Code = Callable[[Floats], Floats]  # rows to code -> rows as a decoder has them
-CourseMetric = tuple[Plan, Any, Any]  # also ``Lanes`` and ``Course`` of kernels
-CodeCourse = Callable[[CourseMetric, Floats, Floats, Floats], None]  # rows, their steps, the result
+CourseMetric: TypeAlias = "tuple[Plan, Lanes, Course]"
+# of the rows, their steps, and the approximations to fill
+CodeCourse: TypeAlias = "Callable[[CourseMetric, Floats, Floats, Floats], None]"
 
 BLOCK_ENTRIES = 2**21  # numbers of factors that are in memory at a time
 

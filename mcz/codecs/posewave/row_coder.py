@@ -8,7 +8,7 @@ from __future__ import annotations
 from copy import copy, deepcopy
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from mcz.codecs.posewave.model import Start, make_model, new_rows, no_rows, star
 from mcz.codecs.posewave.model_state import N_SMALL, LevelRows
 from mcz.errors import FormatError, MotionError
 from mcz.model.types import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from mcz.codecs.posewave.level_coder import CourseMetric
 
 TOO_LARGE = f"{NAME}: a coefficient exceeds 2^29 quantizer steps"
 CARRIED = 40.0  # rows at most that the coarser levels count for
@@ -189,7 +192,7 @@ class RowCoder:
     def encode_course(
         self,
         rate_weight: float,
-        metric: tuple[Any, ...],
+        metric: CourseMetric,
         rows: Floats,
         steps: Floats,
         approx: Floats,

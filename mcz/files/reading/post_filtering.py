@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
@@ -106,7 +105,7 @@ class FilteredClip(Clip):
         values, mask = super().read_masked(None, None, resolution)  # FILT-04
         per_frame = self.signals[0].samples_per_frame
         rows = slice(start * per_frame, stop * per_frame)  # FILT-04
-        columns: Any = slice(None)
+        columns: slice | list[int] = slice(None)
         if joints is not None:
             columns = joint_columns(self.skeleton, joint_list(joints))
         filtered = _filter(values, mask, *self._settings)[rows, columns]
