@@ -47,17 +47,16 @@ if TYPE_CHECKING:
     )
     from mcz.exchange.exporting import export
     from mcz.files.bags import BagCheck, bag, check_bag
+    from mcz.files.editing import Outcome, Report
     from mcz.files.editing.appending import Protection
     from mcz.files.editing.archive import append, pack
-    from mcz.files.editing.batch_report import Outcome, Report
     from mcz.files.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.files.editing.merging import merge
     from mcz.files.editing.metadata_edit import set_metadata, set_rate
-    from mcz.files.editing.recovering import Recovery
+    from mcz.files.editing.recovering import Recovery, protect
     from mcz.files.editing.reorganize import delete_clips, rename_clips, reorder_clips, split
     from mcz.files.editing.repair import Repair, repair
     from mcz.files.editing.replacing import Replacement, replace
-    from mcz.files.editing.rewriting import protect
     from mcz.files.editing.unpacking import unpack
     from mcz.files.live.clip_state import LiveFrame
     from mcz.files.live.generators import LiveReader, live_frames, stream_decode, stream_encode
@@ -126,14 +125,13 @@ _HOMES = {
     "mcz.files.editing.unpacking": ("unpack",),
     "mcz.files.editing.reorganize": ("delete_clips", "rename_clips", "reorder_clips", "split"),
     "mcz.files.editing.merging": ("merge",),
-    "mcz.files.editing.batch_report": ("Outcome", "Report"),
+    "mcz.files.editing": ("Outcome", "Report"),
     "mcz.files.reading.clip": ("Clip",),
     "mcz.files.live.clip_state": ("LiveFrame",),
     "mcz.exchange.conversion": ("Fit", "convert", "from_positions", "left_out"),
     "mcz.exchange.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
-    "mcz.files.editing.rewriting": ("protect",),
     "mcz.files.editing.appending": ("Protection",),
-    "mcz.files.editing.recovering": ("Recovery",),
+    "mcz.files.editing.recovering": ("Recovery", "protect"),
     "mcz.files.editing.repair": ("Repair", "repair"),
     "mcz.files.editing.replacing": ("Replacement", "replace"),
     "mcz.hints": ("Hint",),

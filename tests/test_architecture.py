@@ -65,7 +65,7 @@ LAYERS = {
     "container": ("*", "recovery"),
     "kinematics": ("*", "metrics poses retargeting"),
     "sources": ("*", "sample"),
-    "files": ("queries jobs tables", "reading", "bags writing", "editing live", "dask"),
+    "files": ("queries query_tree tables", "reading jobs", "bags writing", "editing live", "dask"),
     "exchange": ("conversion", "*"),
     "show": ("pictures viewing", "rerun"),
 }

@@ -231,9 +231,8 @@ def test_names_swap_and_sources_follow(files: tuple[Path, Path]) -> None:
 def test_a_rate_that_is_set_later(files: tuple[Path, Path], takes: Path, tmp_path: Path) -> None:
     from fractions import Fraction
 
-    from mcz.files.editing.batch_report import Report
-    from mcz.files.editing.chunk_copier import Change
-    from mcz.files.editing.rewriting import plan_whole, rewriting
+    from mcz.files.editing import Report
+    from mcz.files.editing.rewriting import Change, plan_whole, rewriting
 
     path = tmp_path / "one.mcz"
     mcz.encode(takes / "a" / "walk.amc", path)

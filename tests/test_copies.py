@@ -16,7 +16,7 @@ import pytest
 import mcz
 from mcz import FormatError, MotionError
 from mcz.container.chunks import COPIED, Chunk, ChunkFlag, ChunkType, build_chunk
-from mcz.container.copies import MOST_BYTES, Copy, build_copies, parse_copies
+from mcz.container.encodings import MOST_BYTES, Copy, build_copies, parse_copies
 from mcz.container.limits import BASE
 from mcz.container.scan import scan
 from mcz.container.source import Overlay, open_source

@@ -19,9 +19,8 @@ import pytest
 
 import mcz
 from mcz.files import jobs
-from mcz.files.editing import coded_parts
+from mcz.files.editing import merging
 from mcz.files.jobs import Pool
-from mcz.files.reading import parallel_clips
 from mcz.files.reading.faults import validate
 from mcz.sources.sample import write_samples
 from tests.commands import run
@@ -64,8 +63,8 @@ def fail(error: Exception) -> None:
 
 @pytest.fixture
 def no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coded_parts, "answers", here)
-    monkeypatch.setattr(parallel_clips, "answers", here)
+    monkeypatch.setattr(merging, "answers", here)
+    monkeypatch.setattr(jobs, "answers", here)
 
 
 @pytest.fixture(scope="module")
@@ -237,7 +236,7 @@ def test_a_process_that_dies_again_is_an_error(pool: Pool) -> None:
 def test_a_file_whose_process_dies_is_reported(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(coded_parts, "encode_part", dies_on_c3d)
+    monkeypatch.setattr(merging, "encode_part", dies_on_c3d)
     report = mcz.pack(folder, tmp_path / "all.mcz", jobs=2)
     failed = {o.path: o.message for o in report.failures}
     assert failed["walk.c3d"] == "walk.c3d: it died"
@@ -245,13 +244,13 @@ def test_a_file_whose_process_dies_is_reported(
     assert mcz.verify(tmp_path / "all.mcz") == []
 
 
-def dies_on_c3d(profile: Any, ask: Any) -> coded_parts.Part:
+def dies_on_c3d(profile: Any, ask: Any) -> merging.Part:
     if ask.path.name == "walk.c3d":
         raise mcz.WorkerError("it died")
     return CODED(profile, ask)
 
 
-CODED = coded_parts.encode_part
+CODED = merging.encode_part
 
 
 @pytest.mark.usefixtures("no_processes")
@@ -261,7 +260,7 @@ def test_full_disk_leaves_nothing(
     def full(*args: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(coded_parts, "join_part", full)
+    monkeypatch.setattr(merging, "join_part", full)
     with pytest.raises(mcz.AccessError, match="No space"):
         mcz.pack(folder, tmp_path / "all.mcz", jobs=2)
     assert list(tmp_path.iterdir()) == []
@@ -270,7 +269,7 @@ def test_full_disk_leaves_nothing(
 SLOW = """
 import operator, time
 from mcz.files.jobs import Pool
-from mcz.files.reading import parallel_clips
+
 with Pool(2) as pool:
     for answer in pool.in_order(operator.eq, [1, 2]):
         answer()
@@ -311,7 +310,7 @@ def test_an_interrupt_leaves_nothing(
     def interrupt(*args: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(coded_parts, "join_part", interrupt)
+    monkeypatch.setattr(merging, "join_part", interrupt)
     words = ["pack", str(folder), str(tmp_path / "all.mcz"), "--jobs", "2"]
     assert run(*words) == 130
     assert list(tmp_path.iterdir()) == []

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mcz import OptionError
-from mcz.files.queries import Query, Value
-from mcz.files.queries.evaluation import (
+from mcz.files.queries import WORDS, Query, Value, parse
+from mcz.files.query_tree import (
     And,
     Compare,
     In,
@@ -26,7 +26,6 @@ from mcz.files.queries.evaluation import (
     Or,
     printed,
 )
-from mcz.files.queries.parser import WORDS, parse
 
 CLIP: dict[str, Value] = {
     "name": "05_01",

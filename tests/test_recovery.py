@@ -13,8 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.container.recovery import blocks as recovery_blocks
-from mcz.container.recovery.blocks import Shape, build_packet, read_packet, shape_for
+from mcz.container import recovery as recovery_blocks
+from mcz.container.recovery import Shape, build_packet, read_packet, shape_for
 from mcz.container.recovery.code import (
     divide,
     encode_blocks,

@@ -20,7 +20,7 @@ from mcz.cli.figures import figure_lines
 from mcz.cli.info_lines import _tree
 from mcz.codecs import codec_by_name
 from mcz.codecs.transforms import wavelets
-from mcz.container import strict
+from mcz.container import scanner
 from mcz.container.chunks import build_header
 from mcz.container.writer import Writer
 from mcz.files.writing.atomic import replacing
@@ -357,8 +357,8 @@ def test_salvage_of_a_c3d_without_frames() -> None:
 
 
 def test_sorts_of_source_formats_are_those_of_the_registry() -> None:
-    assert {f.id for f in FORMATS.values() if f.is_skeleton} == strict.OF_SKELETONS
-    assert {f.id for f in FORMATS.values() if not f.is_skeleton} == strict.OF_CLIPS
+    assert {f.id for f in FORMATS.values() if f.is_skeleton} == scanner.OF_SKELETONS
+    assert {f.id for f in FORMATS.values() if not f.is_skeleton} == scanner.OF_CLIPS
 
 
 BONES = mcz.Skeleton((mcz.Joint("knee", channels=(mcz.Channel("rx"),)),), angle_unit="deg")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.container import payloads
-from mcz.container.dictionary_deflate import encode_smallest, words
+from mcz.container.encodings import encode_smallest, words
 from mcz.model.schema import deflate, inflate
 
 TINY = """HIERARCHY

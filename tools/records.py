@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import construct
 import numpy as np
 
-from mcz.container.dictionary_deflate import chunk_id, plain_id
+from mcz.container.encodings import chunk_id, plain_id
 from mcz.container.payloads import AFTER_WORDS, ENCODING
 from mcz.errors import MczError
 from mcz.model.extras import annex_bytes

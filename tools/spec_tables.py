@@ -34,9 +34,9 @@ MODULES = (
     "mcz.container.payloads",
     "mcz.container.directory",
     "mcz.container.segments",
-    "mcz.container.copies",
+    "mcz.container.encodings",
     "mcz.container.metadata",
-    "mcz.container.dictionary_deflate",
+    "mcz.container.encodings",
     "mcz.codecs.wavelet.wavelet",
     "mcz.codecs.curves.qbc",
     "mcz.codecs.pca.pca",
@@ -54,7 +54,7 @@ MODULES = (
     "mcz.sources.text.notes",
     "mcz.sources.tables.source",
     "mcz.sources.c3d.layout",
-    "mcz.container.recovery.blocks",
+    "mcz.container.recovery",
     "mcz.model.numbers",
 )
 NAMED = {

@@ -36,7 +36,7 @@ from mcz.cli.outputs import TARGETS, resolve_output
 from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
-    from mcz.files.editing.batch_report import Report
+    from mcz.files.editing import Report
 
 
 @click.command(short_help="Pack a folder of motion files into one .mcz.")

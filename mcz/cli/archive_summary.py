@@ -12,7 +12,7 @@ from mcz.cli.hints import in_options
 from mcz.files.reading.fidelity import GIVEN_BACK
 
 if TYPE_CHECKING:
-    from mcz.files.editing.batch_report import Outcome, Report
+    from mcz.files.editing import Outcome, Report
 
 
 STORED_RESULTS = ("parsed", "skeleton", "alias", "verbatim", "present", "written", *GIVEN_BACK)

@@ -13,8 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from mcz.container.chunks import END, Chunk, ChunkType
-from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import ClipRow, Directory
+from mcz.container.encodings import chunk_id
 from mcz.container.grammar import INDEX, START, ChunkEvent, Event, Fault, PacketEvent
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import index_limit

@@ -22,8 +22,8 @@ from mcz.container.chunks import (
     read_chunk,
     read_payload,
 )
-from mcz.container.copies import Copy, parse_copies
 from mcz.container.directory import Directory
+from mcz.container.encodings import Copy, parse_copies
 from mcz.container.index_reader import Listed, directory_of, read_indexes
 from mcz.container.limits import BASE, index_limit
 from mcz.container.model_records import build_head, parse_head

@@ -31,7 +31,7 @@ class Profile:
     text_bytes: int
     signals: int
     rows: int
-    is_plain: bool = False  # nothing is packed, codecs and grids are few: see ``strict.py``
+    is_plain: bool = False  # nothing is packed, codecs and grids are few: see ``scanner.py``
     # decoded size of a segment that writers make, so that its DATA is short
     coded_bytes: int = 2**53
 

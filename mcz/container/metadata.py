@@ -12,7 +12,7 @@ from datetime import date, datetime
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
-from mcz.container.dictionary_deflate import decode_data, encode_smallest
+from mcz.container.encodings import decode_data, encode_smallest
 from mcz.container.limits import BASE, MIB, Profile, check, metadata_limit
 from mcz.errors import FormatError, OptionError
 from mcz.model.schema import build, parse, parse_all

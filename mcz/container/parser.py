@@ -106,7 +106,7 @@ class Parser:
         self.size, self.at, self.state = size, at, state
         self.profile = BASE
         self.is_done = False
-        self._number, self._is_told = 0, False  # of the next frame, if a packet states it
+        self._number, self._is_numbered = 0, False  # of the next frame, if a packet states it
         self._want, self._check, self._name = want, check, "the file"
         self._start, self._data = at, b""  # fed bytes that may still be needed
         self._stop = at + 1  # bytes up to here are needed
@@ -325,7 +325,7 @@ class Parser:
         rows, state = GRAMMAR[event.thing], self.state
         self.state = rows.get(state) or state_after_misplaced(event.thing, state)
         self._index = event.chunk if event.thing == "INDX" else None
-        self._sequence, self._is_told = 0, False
+        self._sequence, self._is_numbered = 0, False
         if state in rows:  # GRAM-01
             return event
         error = order_error(event.thing, event.chunk.label, state)
@@ -387,7 +387,7 @@ class Parser:
         """Skip so many missing packets; raises FormatError."""
 
     def _due(self) -> int:
-        if not self._is_told:  # PACK-14
+        if not self._is_numbered:  # PACK-14
             raise FormatError(f"packet at {self.at}: no packet before it states its frame")
         return self._number
 
@@ -404,13 +404,13 @@ class Parser:
             event.number, event.is_masked = self._number, self._is_masked
             self._number += 1
         elif packet.kind == SEGMENT:
-            was_told, self._is_told = self._is_told, False
+            was_numbered, self._is_numbered = self._is_numbered, False
             header, _ = parse_segment_header(packet.body)
             if header.signal == 0:
                 self._mask_segment, self._is_masked = packet.body, bool(header.flags & MASKS)
                 self._implied = None if self._is_masked else b""
                 self._number = header.stop
-            self._is_told = was_told or header.signal == 0
+            self._is_numbered = was_numbered or header.signal == 0
             if packet.fresh != bool(header.flags & FRESH):  # PACK-11
                 raise FormatError(
                     f"packet at {event.body}: packet and segment disagree whether it starts fresh"

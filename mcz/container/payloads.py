@@ -127,7 +127,7 @@ class SkeletonSource(Record):
 
 
 class Skel(Record):
-    """SKEL, a skeleton; ``dictionary_deflate.py`` has cleared bit 1 of its flags."""
+    """SKEL, a skeleton; ``encodings.py`` has cleared bit 1 of its flags."""
 
     name: str = field(TEXT, "name of the skeleton")
     flags: int = field(

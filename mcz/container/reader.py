@@ -34,9 +34,16 @@ from mcz.container.chunks import (
     read_chunk,
     read_payload,
 )
-from mcz.container.copies import Copy, copy_chunks, find_uncopied
-from mcz.container.dictionary_deflate import chunk_id, join_parts, plain_id, plain_payload
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow
+from mcz.container.encodings import (
+    Copy,
+    chunk_id,
+    copy_chunks,
+    find_uncopied,
+    join_parts,
+    plain_id,
+    plain_payload,
+)
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.metadata import Placed, Record, apply_records, read_records
@@ -92,9 +99,8 @@ class Container:
         self.feet: list[int] = []  # offsets of FOOTs found by salvage
         self.unverified = 0
         self.runs = DecodedCache()
-        self.index: Foot | None = None
         self._said = MetadataCache()
-        self._told = 0, b""  # a segment in a packet, and its mask
+        self._last_mask = 0, b""  # a segment in a packet, and its mask
         self._skeletons: dict[bytes, tuple[payloads.Skel, Skeleton]] = {}
         self.directory = directory or (self._salvage() if salvage else self._open())
         self.profile: Profile = parse_head(self.directory.head)
@@ -123,7 +129,6 @@ class Container:
         foot = self._read_foot(tail)
         if not foot.index_length:
             return scan(self.source).directory
-        self.index = foot
         head = None if self.source.remote else self._read_head()  # HEAD-01
         directory = self._read_directory(foot, tail)
         directory.end = self.source.size
@@ -364,13 +369,10 @@ class Container:
     def _implied_mask(self, row: SegmentRow) -> bytes:
         if row.mask_row is None:
             return b""
-        offset, mask = self._told
-        if offset != row.mask_row.offset:
-            offset, mask = self._told = (
-                row.mask_row.offset,
-                mask_of(self._read_packet(row.mask_row)),
-            )  # PACK-20
-        return mask
+        if self._last_mask[0] != row.mask_row.offset:
+            mask = mask_of(self._read_packet(row.mask_row))  # PACK-20
+            self._last_mask = row.mask_row.offset, mask
+        return self._last_mask[1]
 
     def _check_row(self, row: SegmentRow) -> None:
         if row.stop > self.source.size:

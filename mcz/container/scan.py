@@ -12,8 +12,8 @@ from contextlib import suppress
 from types import MappingProxyType
 
 from mcz.container.chunks import END, FOOT, FRAMING, REPEATED, Chunk, ChunkType, read_payload
-from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import SegmentRow
+from mcz.container.encodings import chunk_id
 from mcz.container.grammar import (
     BODY,
     CLIP,

@@ -29,15 +29,22 @@ from mcz.container.chunks import (
     build_packet,
     implied_by,
 )
-from mcz.container.copies import Copy, build_copies, group_copies, is_worth_copying
-from mcz.container.dictionary_deflate import chunk_id, encode_smallest, plain_id
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow
+from mcz.container.encodings import (
+    Copy,
+    build_copies,
+    chunk_id,
+    encode_smallest,
+    group_copies,
+    is_worth_copying,
+    plain_id,
+)
 from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
 from mcz.container.metadata import Record, build_metas
 from mcz.container.model_records import build_head
+from mcz.container.scanner import check_plain
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
-from mcz.container.strict import check_plain
 from mcz.errors import FormatError, MotionError
 from mcz.model.motion import Skeleton
 from mcz.model.schema import build

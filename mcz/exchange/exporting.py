@@ -11,14 +11,13 @@ from mcz.errors import FormatError, MczError, OptionError
 from mcz.exchange.bids import clip_files, data_set_files
 from mcz.exchange.conversion import TARGETS, converted_files, left_out
 from mcz.exchange.conversion.scenes import WRITERS, to_scene
-from mcz.files.editing.batch_report import Outcome, Report, failure_outcome
+from mcz.files.editing import Outcome, Report, failure_outcome
 from mcz.files.editing.folders import Folder, PortableNames
 from mcz.files.editing.unpacking import safe_path
-from mcz.files.jobs import limit_jobs
+from mcz.files.jobs import limit_jobs, share_clips
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where
 from mcz.files.reading.file import File, open, suffixes_of
-from mcz.files.reading.parallel_clips import share_clips
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.tables import EXPORTS, table_of
 from mcz.model.motion import Motion

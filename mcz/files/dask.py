@@ -23,17 +23,16 @@ from uuid import uuid4
 from mcz.container.limits import Profile, profile_named
 from mcz.container.source import file_system
 from mcz.errors import AccessError, MczError, OptionError, SourceError, WorkerError
+from mcz.files.editing import Outcome, Report
 from mcz.files.editing.archive import write_in_turn
-from mcz.files.editing.batch_report import Outcome, Report
-from mcz.files.editing.coded_parts import Part, RemotePart, encode_part
 from mcz.files.editing.folders import NO_MOTION, files_below, motion_files, notes_on, size_of
-from mcz.files.jobs import Answer, Item, Result, use_engine
+from mcz.files.editing.merging import Part, RemotePart, encode_part
+from mcz.files.jobs import Answer, Item, Result, can_be_shared, share_clips, use_engine
 from mcz.files.reading import faults
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where
 from mcz.files.reading.faults import Problem
 from mcz.files.reading.file import File, open
-from mcz.files.reading.parallel_clips import can_be_shared, share_clips
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.writing.atomic import WriteTransaction, replacing
 from mcz.files.writing.file import SourceEncoder, encoding_options

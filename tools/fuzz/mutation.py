@@ -13,7 +13,7 @@ from typing import Any
 from mcz.codecs import ENTRIES
 from mcz.container import payloads
 from mcz.container.chunks import FRAME, SEGMENT, Packet
-from mcz.container.dictionary_deflate import decode_data
+from mcz.container.encodings import decode_data
 from mcz.container.segments import parse_segment_header
 from mcz.errors import MczError
 from mcz.model.schema import MAX_COUNT, build, parse

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from mcz.codecs import CODECS, bitstream_name
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, parse_chunk_header
-from mcz.container.dictionary_deflate import unpack_skeleton
+from mcz.container.encodings import unpack_skeleton
 from mcz.container.limits import BASE
 from mcz.errors import MczError
 from mcz.model.schema import parse

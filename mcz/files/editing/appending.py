@@ -31,7 +31,7 @@ from mcz.container.chunks import (
 from mcz.container.directory import Directory
 from mcz.container.index import build_index
 from mcz.container.reader import Container
-from mcz.container.recovery.blocks import Key, Shape, Step, encode_packets, read_packet, shape_for
+from mcz.container.recovery import Key, Shape, Step, encode_packets, read_packet, shape_for
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource, locked_file
 from mcz.errors import (

@@ -14,10 +14,8 @@ from mcz.container import payloads
 from mcz.container.limits import profile_named
 from mcz.container.metadata import SETTABLE, Record
 from mcz.errors import MczError, OptionError, SourceError, remark_of
+from mcz.files.editing import Outcome, Report
 from mcz.files.editing.appending import growing, redundancy_of, still_protect
-from mcz.files.editing.batch_report import Outcome, Report
-from mcz.files.editing.chunk_copier import UNPROTECTED
-from mcz.files.editing.coded_parts import RemotePart, encode_ahead
 from mcz.files.editing.folders import (
     dropped_facts,
     files_below,
@@ -28,9 +26,10 @@ from mcz.files.editing.folders import (
     skipped_outcome,
     stamp,
 )
-from mcz.files.editing.merging import add_files
+from mcz.files.editing.merging import RemotePart, add_files, encode_ahead
 from mcz.files.editing.metadata_edit import set_metadata
 from mcz.files.editing.reorganize import delete_clips
+from mcz.files.editing.rewriting import UNPROTECTED
 from mcz.files.editing.unpacking import Content, stored_files
 from mcz.files.jobs import limit_jobs
 from mcz.files.reading.file import File, open

@@ -13,8 +13,8 @@ from functools import partial
 
 from mcz.codecs.contract import Span
 from mcz.container import payloads
-from mcz.container.dictionary_deflate import parse_skel
 from mcz.container.directory import SegmentRow
+from mcz.container.encodings import parse_skel
 from mcz.container.limits import Profile
 from mcz.container.model_records import put_time_base, time_base_of
 from mcz.container.reader import Container

@@ -18,7 +18,6 @@ from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.model_records import ValueDigest, value_hash
 from mcz.container.segments import SegmentHeader
 from mcz.errors import FormatError, MotionError, OptionError
-from mcz.files.editing.chunk_copier import ChunkCopier, metadata_records
 from mcz.files.editing.cutting import (
     WITHOUT_SOURCE,
     ClipCut,
@@ -39,7 +38,7 @@ from mcz.files.editing.recoding import (
     settings_of_joints,
     with_own_source,
 )
-from mcz.files.editing.rewriting import writer_like
+from mcz.files.editing.rewriting import ChunkCopier, metadata_records, writer_like
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where
 from mcz.files.reading.file import File, open

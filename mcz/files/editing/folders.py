@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
 from mcz.errors import AccessError, ExistsError, OptionError, reason_of, remark_of
-from mcz.files.editing.batch_report import Outcome
+from mcz.files.editing import Outcome
 from mcz.files.reading.clips import MOST_NAMES, list_some
 from mcz.files.writing.atomic import replacing
 from mcz.hints import Hint, Remark

@@ -21,10 +21,9 @@ from mcz.container.metadata import (
 )
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, OptionError, reason_of
+from mcz.files.editing import Outcome, Report
 from mcz.files.editing.appending import growing, redundancy_of, still_protect
-from mcz.files.editing.batch_report import Outcome, Report
-from mcz.files.editing.chunk_copier import Change
-from mcz.files.editing.rewriting import CLIP, plan_whole, rewriting, steps
+from mcz.files.editing.rewriting import CLIP, Change, plan_whole, rewriting
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where, list_some, names_of
 from mcz.files.reading.fidelity import states_rate
@@ -86,13 +85,12 @@ def set_metadata(
 
 def _purge(target: str | os.PathLike[str], progress: Progress | None) -> list[str]:
     """Rewrite a file so that its metadata are in CLIP; return what was left out."""
-    with rewriting(target) as job:
-        report, plan = Report(), plan_whole(job.file)
+    with rewriting(target, progress=progress) as job:
+        plan = plan_whole(job.file)
         plan.drops_meta = True  # META-09
         for clip in job.file:
             plan.things[CLIP, clip.name] = Change(metadata=clip.metadata)
-        job.write(plan, report, steps(progress, len(job.file.clips)))
-        return report.left_out
+        return job.write(plan, Report()).left_out
 
 
 def registered_key(key: str) -> str:
@@ -138,7 +136,7 @@ def set_rate(
     exact = frame_rate_of(rate, "rate").limit_denominator(10**6)
     if exact <= 0:
         raise OptionError(f"rate is {rate}; it must be above 0")
-    with rewriting(target, output, force=force) as job:
+    with rewriting(target, output, force=force, progress=progress) as job:
         file = job.file
         named = names is not None or where is not None
         clips = file.chosen(names, where) if named else [c for c in file if c.frame_rate is None]
@@ -149,7 +147,7 @@ def set_rate(
             report.outcomes.append(Outcome(clip.name, "rate", 0, f"{float(exact):g}"))
         if not clips:
             return report
-        job.write(plan, report, steps(progress, len(file.clips)))
+        job.write(plan, report)
     _check_sources(target if output is None else output, [clip.name for clip in clips])
     return report
 

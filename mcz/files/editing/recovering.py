@@ -1,4 +1,4 @@
-"""Restore the bytes of a damaged file from its recovery data.
+"""``protect``: add recovery data to a file; and restore the bytes of a damaged one from them.
 
 SPEC.md, "RECV", is normative. Blocks are searched at their stated offsets, and at offsets shifted
 by bytes that were inserted or cut off before them, as intact packets show.
@@ -6,6 +6,7 @@ by bytes that were inserted or cut off before them, as intact packets show.
 
 from __future__ import annotations
 
+import os
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,13 +16,14 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mcz.container.recovery.blocks import (
+from mcz.container.recovery import (
     BODY_AT,
     HASH,
     Key,
     Packet,
     Shape,
     Step,
+    check_redundancy,
     compute_lanes,
     encode_packets,
     find_packets,
@@ -30,8 +32,18 @@ from mcz.container.recovery.blocks import (
 from mcz.container.recovery.code import LANE, encode_blocks, recover_blocks
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError
-from mcz.files.editing.appending import chunk_bytes
+from mcz.files.editing.appending import (
+    DEFAULT,
+    Protection,
+    add_recovery,
+    chunk_bytes,
+    protect_written,
+    protection_of,
+    redundancy_of,
+)
+from mcz.files.editing.rewriting import UNPROTECTED, disk_path, plan_whole, rewriting
 from mcz.files.reading.file import open_bytes
+from mcz.files.writing.atomic import replacing_file
 from mcz.model.indexing import merged_ranges
 from mcz.model.text_format import brief
 from mcz.model.types import Progress, Target
@@ -347,3 +359,41 @@ def _steps(progress: Progress) -> Step:
         progress(done + 1, total, "recovery data")
 
     return step
+
+
+def protect(
+    target: str | os.PathLike[str],
+    redundancy: float = DEFAULT,
+    *,
+    anew: bool = False,
+    progress: Step | None = None,
+) -> list[Protection]:
+    """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
+
+    ``mcz.repair`` restores every byte as long as there are no more bad blocks than recovery blocks,
+    wherever they lie: single bytes, a burst, the beginning, the end. If the file has recovery data
+    already, only bytes appended since get new data; without such bytes nothing changes. ``anew``
+    rewrites the file and computes recovery data for all of it. Returns all recovery data, in the
+    order of the file. Raises OptionError for a ``redundancy`` out of range, FormatError where
+    rewriting would lose a chunk of unknown type, AccessError where another process is appending,
+    and as ``mcz.append`` for a file cut short.
+    """
+    check_redundancy(redundancy)
+    if anew and (protection := _protect_again(target, redundancy, progress)) is not None:
+        return [protection]
+    return add_recovery(target, redundancy, progress)
+
+
+def _protect_again(target: Target, redundancy: float, progress: Step | None) -> Protection | None:
+    """Rewrite a file with recovery data for all of it; None without a change if it has none.
+
+    The old recovery data stay until the new are written.
+    """
+    with rewriting(target) as job:
+        if redundancy_of(job.file.container) is None:
+            return None
+        with replacing_file(disk_path(target), force=True) as stream:
+            left_out = job.copy_to(stream, plan_whole(job.file), lambda name: None)
+            if lost := [text for text in left_out if text != UNPROTECTED]:
+                raise FormatError(f"rewriting it would lose {lost[0]}", path=job.file.name)
+            return protection_of(protect_written(stream, redundancy, progress))

@@ -9,14 +9,14 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
-from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
+from mcz.container.reader import Container
 from mcz.errors import ExistsError, OptionError
-from mcz.files.editing.batch_report import Outcome, Report
-from mcz.files.editing.chunk_copier import UNCHANGED, Change
+from mcz.files.editing import Outcome, Report
 from mcz.files.editing.folders import PortableNames
 from mcz.files.editing.rewriting import (
     ALIAS,
@@ -24,21 +24,23 @@ from mcz.files.editing.rewriting import (
     CLIP,
     KINDS,
     SKELETON,
+    UNCHANGED,
+    Change,
     Plan,
     Rewriting,
+    Shared,
     Thing,
     path_of,
     plan_whole,
     rewriting,
     steps,
     things_in,
-    used_by,
-    used_by_skeleton,
 )
 from mcz.files.queries import Value
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where, getter_of, list_some, matching_clips
 from mcz.files.reading.file import File, open
+from mcz.files.reading.sizes import models_used
 from mcz.files.writing.atomic import check_name
 from mcz.hints import Hint
 from mcz.model.text_format import counted, nearest, shown
@@ -65,7 +67,7 @@ def delete_clips(
     it is refused. ``output``: the new file, to which ``force`` applies; None: it replaces the old
     one once it is complete. Raises OptionError for an unknown name, and without any.
     """
-    with rewriting(target, output, force=force) as job:
+    with rewriting(target, output, force=force, progress=progress) as job:
         file = job.file
         named = [_find_thing(file, name) for name in ([names] if isinstance(names, str) else names)]
         if where is not None:
@@ -89,11 +91,11 @@ def delete_clips(
             if thing not in plan.things:  # with the clips that had the skeleton
                 what.setdefault(thing, "the file of a skeleton that no other clip has")
         report = Report([Outcome(name, "deleted", 0, reason) for (_, name), reason in what.items()])
-        return _finish(job, plan, report, progress)
+        return job.write(plan, report)
 
 
 def _find_thing(file: File, name: str) -> Thing:
-    tables: tuple[Container[str], ...] = (file.clips.rows, file.attachments, file.aliases)
+    tables: tuple[Collection[str], ...] = (file.clips.rows, file.attachments, file.aliases)
     for kind, table in zip(KINDS, tables, strict=True):
         if name in table:
             return kind, name
@@ -148,7 +150,7 @@ def rename_clips(
     their own names, follow the clip. Names may be swapped. ``output`` and ``force`` are as in
     ``delete_clips``. Raises OptionError for an unknown name, and for one that is in use.
     """
-    with rewriting(target, output, force=force) as job:
+    with rewriting(target, output, force=force, progress=progress) as job:
         file, report = job.file, Report()
         plan = plan_whole(file)
         for old, new in names.items():
@@ -157,7 +159,7 @@ def rename_clips(
             plan.things[thing] = _rename_change(file, thing, new)
             report.outcomes.append(Outcome(thing[1], "renamed", 0, new))
         _refuse_equal(file, plan)
-        return _finish(job, plan, report, progress)
+        return job.write(plan, report)
 
 
 def _rename_change(file: File, thing: Thing, new: str) -> Change:
@@ -201,14 +203,14 @@ def reorder_clips(
         names = [names]
     if not names and by is None:
         raise OptionError("no order given: name clips, or give a key to sort by")
-    with rewriting(target, output, force=force) as job:
+    with rewriting(target, output, force=force, progress=progress) as job:
         file = job.file
         rest = list(file) if by is None else in_order(file, list(file), by)
         clips = dict.fromkeys((CLIP, clip.name) for clip in (*file.clips_called(names), *rest))
         plan = plan_whole(file)
         plan.things = dict.fromkeys([*clips, *plan.things], UNCHANGED)
         report = Report([Outcome(name, "moved") for _, name in clips])
-        return _finish(job, plan, report, progress)
+        return job.write(plan, report)
 
 
 def in_order(file: File, clips: Sequence[Clip], by: str) -> list[Clip]:
@@ -259,7 +261,7 @@ def split(
         step = steps(progress, len(file.clips))
         for value, names in groups.items():
             plan, part = _plan_part(file, names, with_rest=value == rest), Report()
-            Rewriting(target, outputs[value], force, file).write(plan, part, step)
+            Rewriting(target, outputs[value], force, None, file).write(plan, part, step)
             message = counted(len(names), "clip")
             report.outcomes.append(Outcome(str(outputs[value]), "written", part.size or 0, message))
     return report
@@ -312,6 +314,30 @@ def _plan_part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
     return plan
 
 
-def _finish(job: Rewriting, plan: Plan, report: Report, progress: Progress | None) -> Report:
-    job.write(plan, report, steps(progress, len(plan.things_of(CLIP))))
-    return report
+def used_by(file: File, names: Iterable[str]) -> set[Shared]:
+    """The skeletons with their bases, the templates and the models that these clips need."""
+    container, used = file.container, set[Shared]()
+    has_models = bool(container.directory.ids(ChunkType.MODL))
+    for name in names:
+        row = container.directory.clips[name]
+        source = container.clip_head(row).source
+        if source is not None:
+            used.add((ChunkType.SRCE, source.template))
+        if (ChunkType.SKEL, row.skeleton) not in used:
+            used |= used_by_skeleton(container, row.skeleton)
+        for signal in file.clips[name].signals if has_models else ():
+            used |= {(ChunkType.MODL, id_) for id_ in models_used(signal)}
+    return used
+
+
+def used_by_skeleton(container: Container, id_: bytes) -> set[Shared]:
+    """A skeleton, its bases, and the templates of their own files."""
+    used: set[Shared] = set()
+    next_id: bytes | None = id_
+    while next_id and (ChunkType.SKEL, next_id) not in used:
+        fields = container.skeleton_fields(next_id)
+        used.add((ChunkType.SKEL, next_id))
+        if fields.source:
+            used.add((ChunkType.SRCE, bytes(fields.source.template)))
+        next_id = fields.base
+    return used

@@ -24,10 +24,10 @@ from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, MczError, OptionError, error_context, remark_of
-from mcz.files.editing.chunk_copier import UNPROTECTED
 from mcz.files.editing.cutting import ClipCut, plan_cut
 from mcz.files.editing.extraction import Copying
 from mcz.files.editing.recovering import recover
+from mcz.files.editing.rewriting import UNPROTECTED
 from mcz.files.editing.salvage_copier import (
     FULL,
     NO_PART,

@@ -14,8 +14,8 @@ from pathlib import PurePosixPath
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.container.dictionary_deflate import parse_skel
 from mcz.container.directory import ClipRow
+from mcz.container.encodings import parse_skel
 from mcz.errors import FormatError, MczError
 from mcz.files.editing.cutting import ClipCut, note_source
 from mcz.files.editing.extraction import Copier, Copying

@@ -14,18 +14,17 @@ from pathlib import Path, PurePosixPath
 from mcz.container import payloads
 from mcz.container.chunks import CRC, HEADER
 from mcz.container.reader import Container
+from mcz.container.scanner import check_path
 from mcz.container.source import Forward
-from mcz.container.strict import check_path
 from mcz.errors import FormatError, MczError, OptionError
-from mcz.files.editing.batch_report import Outcome, Report, failure_outcome
+from mcz.files.editing import Outcome, Report, failure_outcome
 from mcz.files.editing.folders import HIDDEN, Folder, PortableNames, notes_on, set_time, visible
 from mcz.files.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Thing
-from mcz.files.jobs import limit_jobs
+from mcz.files.jobs import limit_jobs, share_clips
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where, list_some
 from mcz.files.reading.fidelity import RESTORED, fidelity_of, text_notes
 from mcz.files.reading.file import File, open
-from mcz.files.reading.parallel_clips import share_clips
 from mcz.files.writing.atomic import Digest
 from mcz.model.schema import parse, parse_until, read_varint
 from mcz.model.types import Progress, Settings, Target

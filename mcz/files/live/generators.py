@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType, build_foot
-from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import SegmentRow
+from mcz.container.encodings import chunk_id
 from mcz.container.grammar import ChunkEvent, PacketEvent
 from mcz.container.parser_drivers import Stream
 from mcz.container.reader import Container

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.container.dictionary_deflate import chunk_id
+from mcz.container.encodings import chunk_id
 from mcz.container.grammar import ChunkEvent, Fault, FootEvent, PacketEvent
 from mcz.container.limits import BASE, check
 from mcz.container.model_records import parse_head
-from mcz.container.parser_drivers import Stream, repeated_chunks
+from mcz.container.parser_drivers import Stream, TolerantParser, repeated_chunks
 from mcz.container.segments import FRESH, SegmentHeader, parse_segment_header
-from mcz.container.tolerant_parser import TolerantParser
 from mcz.errors import (
     ChecksumError,
     FormatError,

@@ -15,7 +15,6 @@ from mcz.container.limits import check_decoded
 from mcz.container.model_records import ValueDigest, value_hash
 from mcz.container.reader import Container
 from mcz.errors import ChecksumError, FormatError, OptionError
-from mcz.files.reading.pose_methods import PoseMethod, method_of
 from mcz.files.reading.signal_info import SignalInfo, groups_of
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.files.reading.source_info import SourceInfo, read_source, sourced_skeleton, stating_rate
@@ -24,9 +23,11 @@ from mcz.files.reading.views import (
     ClipValues,
     FrameValues,
     Masked,
+    PoseMethod,
     Preview,
     decimate_motion,
     decimate_rows,
+    method_of,
     preview,
 )
 from mcz.hints import Hint

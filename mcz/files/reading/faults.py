@@ -10,7 +10,7 @@ from functools import partial
 from mcz.container.checksums import ChecksumReport, check_checksums
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.reader import Container
-from mcz.container.recovery.blocks import encode_packets, read_packet
+from mcz.container.recovery import encode_packets, read_packet
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.errors import (
@@ -22,11 +22,10 @@ from mcz.errors import (
     error_context,
     remark_of,
 )
-from mcz.files.jobs import limit_jobs
+from mcz.files.jobs import limit_jobs, share_clips
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where
 from mcz.files.reading.file import File, open, open_bytes
-from mcz.files.reading.parallel_clips import share_clips
 from mcz.files.reading.signal_info import read_segments
 from mcz.model.text_format import brief
 from mcz.model.types import Target

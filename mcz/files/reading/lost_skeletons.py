@@ -17,8 +17,8 @@ import numpy as np
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.container.dictionary_deflate import chunk_id, pack_skeleton
 from mcz.container.directory import ClipRow
+from mcz.container.encodings import chunk_id, pack_skeleton
 from mcz.container.limits import check, check_decoded
 from mcz.container.model_records import build_skeleton
 from mcz.container.reader import Container

@@ -27,8 +27,7 @@ from mcz.container.segments import (
     values_of_exceptions,
 )
 from mcz.errors import FormatError, MczError
-from mcz.files.reading.segment_salvage import salvage
-from mcz.files.reading.signal_info import SignalInfo
+from mcz.files.reading.signal_info import SignalInfo, salvage
 from mcz.kernels import lacks_compiled_kernels
 from mcz.model.indexing import merged_ranges
 from mcz.model.motion import Exceptions, Signal

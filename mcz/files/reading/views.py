@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, TypeVar
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -16,6 +17,9 @@ from mcz.model.clock import numbers_or_rows
 from mcz.model.indexing import Rows, row_numbers
 from mcz.model.motion import Exceptions, FrameNotes, Motion, Signal
 from mcz.model.types import Values
+
+if TYPE_CHECKING:
+    from mcz.kinematics.poses.motion_like import MotionLike
 
 
 class Masked(NamedTuple):
@@ -212,3 +216,26 @@ def pick_notes(join_notes: JoinNotes, notes: FrameNotes, frames: range) -> Frame
     if frames.step == 1:
         return notes.part(frames.start, frames.stop)
     return join_notes([(i, i + 1, notes.cut(f, f + 1)) for i, f in enumerate(frames)])
+
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+class PoseMethod:
+    """A function of ``mcz.kinematics.poses`` as a method of its name, imported on first use."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._owner, self._name = owner, name
+
+    def __get__(self, instance: object, owner: type) -> object:
+        function = getattr(import_module("mcz.kinematics.poses"), self._name)
+        setattr(self._owner, self._name, function)
+        return function.__get__(instance, owner)
+
+
+def method_of(
+    function: Callable[Concatenate[MotionLike, P], T],
+) -> Callable[Concatenate[Any, P], T]:
+    """Type of a method: checkers need not find out whether a clip is a ``ClipLike``."""
+    return function

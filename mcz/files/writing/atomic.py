@@ -20,13 +20,13 @@ from typing import BinaryIO, cast
 from urllib.parse import unquote, urlsplit
 
 from mcz.container import payloads
-from mcz.container.copies import Copy
 from mcz.container.directory import Directory
+from mcz.container.encodings import Copy
 from mcz.container.limits import Profile
 from mcz.container.metadata import KEYS, PRIVATE
 from mcz.container.scan import scan
+from mcz.container.scanner import is_plain_path
 from mcz.container.source import ByteSource, file_system, is_abandoned, lock
-from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
 from mcz.errors import (
     AccessError,

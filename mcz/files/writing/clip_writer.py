@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import Codec, Segment
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.container.dictionary_deflate import pack_skeleton
+from mcz.container.encodings import pack_skeleton
 from mcz.container.limits import Profile, check
 from mcz.container.model_records import (
     ValueDigest,

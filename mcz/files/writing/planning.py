@@ -15,7 +15,7 @@ from mcz.codecs.parameters import TARGETS
 from mcz.container import payloads
 from mcz.container.limits import LARGE, Profile, check
 from mcz.container.model_records import channel_records, put_time_base, time_base_of
-from mcz.container.strict import is_plain_path
+from mcz.container.scanner import is_plain_path
 from mcz.errors import MotionError, OptionError
 from mcz.files.reading.source_info import stating_rate
 from mcz.files.writing.signal_bounds import of_codec

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from mcz.container import payloads
 from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_chunk_header
-from mcz.container.copies import Copy
+from mcz.container.encodings import Copy
 from mcz.model.schema import deflate, varint
 from tools.records import build_record
 from tools.vectors.build.files import Crafter

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mcz.container import payloads
-from mcz.container.dictionary_deflate import words
+from mcz.container.encodings import words
 from mcz.container.metadata import Record, record_bytes
 from mcz.model.schema import deflate
 from tools.records import build_record

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from mcz.files.editing.archive import append
-from mcz.files.editing.rewriting import protect
+from mcz.files.editing.recovering import protect
 
 
 def protect_file(data: bytes, redundancy: float, behind: bytes = b"") -> bytes:

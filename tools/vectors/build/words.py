@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mcz.container import payloads
-from mcz.container.dictionary_deflate import PACKED, words
+from mcz.container.encodings import PACKED, words
 from mcz.model.schema import deflate, inflate, parse, varint
 from tools.records import build_record
 

@@ -14,8 +14,8 @@ from mcz.codecs.spatial.lsdt_frame import FrameHeader
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.codecs.wavelet.wavelet import WaveletHeader
 from mcz.container import payloads, segments
-from mcz.container.dictionary_deflate import decode_data, words
 from mcz.container.directory import Index, Indx
+from mcz.container.encodings import decode_data, words
 from mcz.model.schema import (
     Record,
     build,
