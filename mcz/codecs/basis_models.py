@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.residuals import code_table
 from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import Layout, Model, model_id
 from mcz.errors import FormatError, MotionError, UnsupportedError
@@ -136,8 +137,6 @@ def parse_bases(data: bytes, where: str = "model") -> tuple[Basis, ...]:
 def _loop(
     state: Ints, data: NDArray[np.uint8], tables: Sequence[Ints], shifts: Sequence[Ints]
 ) -> bool:
-    from mcz.codecs.coding.residuals import code_table
-
     for table, digits in zip(tables, shifts, strict=True):  # BASES-07
         scales = (1 << digits) >> (table.shape[1].bit_length() // 2)  # BASES-07
         if code_table(state, data, table, scales, 1):

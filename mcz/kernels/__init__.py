@@ -49,34 +49,36 @@ SLOW = "kernels run as plain Python, 50 to 500 times slower: "
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
-    """``function`` as Python calls it: compiled where it can be."""
+    """``function`` as Python calls it, compiled if possible; the first call loads its unit."""
     if MODE == INTERPRETED:
         return function
-    unit, fault = _unit(UNIT_OF[function.__module__])
-    if unit is None:
-        return _interpreted(function, fault)
-    name = f"{function.__module__.removeprefix('mcz.').replace('.', '_')}__{function.__name__}"
-    compiled = cast(Callable[P, T], getattr(unit, f"call_{name}"))
+    chosen: Callable[P, T] | None = None
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
-        return compiled(*args, **kwargs)
+        nonlocal chosen
+        if chosen is None:
+            chosen = compiled_form(function)
+        return chosen(*args, **kwargs)
 
     return call
 
 
-def _interpreted(function: Callable[P, T], fault: str) -> Callable[P, T]:
-    """Return ``function`` as plain Python; warns once that it is slow."""
+def compiled_form(function: Callable[P, T]) -> Callable[P, T]:
+    """The compiled form of ``function``; without one, plain Python that warns once."""
+    unit, fault = _unit(UNIT_OF[function.__module__])
+    if unit is not None:
+        name = f"{function.__module__.removeprefix('mcz.').replace('.', '_')}__{function.__name__}"
+        return cast(Callable[P, T], getattr(unit, f"call_{name}"))
 
-    @wraps(function)
-    def call(*args: P.args, **kwargs: P.kwargs) -> T:
+    def interpret(*args: P.args, **kwargs: P.kwargs) -> T:
         import numpy as np
 
         _warn(SLOW + fault)
         with np.errstate(all="ignore"):  # compiled, numbers wrap and overflow silently
             return function(*args, **kwargs)
 
-    return call
+    return interpret
 
 
 @cache

@@ -9,11 +9,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from functools import cache
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding import mixing
 from mcz.codecs.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.errors import FormatError
 from mcz.model.extras import annex_bytes
@@ -22,26 +22,19 @@ from mcz.model.types import Ints, Params
 Loop = Callable[[Ints, NDArray[np.uint8]], bool]
 
 
-@cache
-def _coder() -> ModuleType:
-    from mcz.codecs.coding import mixing
-
-    return mixing
-
-
 def bare_state() -> Ints:
     """The state of a coder of numbers with equally likely bits, without contexts."""
-    return np.zeros(_coder().SQUASH, np.int64)
+    return np.zeros(mixing.SQUASH, np.int64)
 
 
 def encode_stream(start: Ints, size: int, loop: Loop, what: str) -> bytes:
     """The bytes that ``loop`` writes from the state ``start``; about ``size`` are expected."""
     while True:
         data, state = np.zeros(size, np.uint8), start.copy()
-        _coder().start(state, data, 1)
+        mixing.start(state, data, 1)
         if not loop(state, data):
             raise AssertionError(f"{what} has no code")
-        used = _coder().finish(state, data)
+        used = mixing.finish(state, data)
         if used <= size:
             return data[:used].tobytes()
         size = used + 256
@@ -54,10 +47,10 @@ def decode_stream(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: b
     """
     data = np.frombuffer(stream, np.uint8).copy()  # compiled once: for writable bytes
     state = start.copy()
-    _coder().start(state, data, 0)
+    mixing.start(state, data, 0)
     if not loop(state, data):
         raise FormatError(f"{what} is out of range")
-    if whole and _coder().coded_size(state) != len(data):  # RANGE-04
+    if whole and mixing.coded_size(state) != len(data):  # RANGE-04
         raise FormatError(f"{what}: the stream should not have {len(data)} bytes")
 
 
@@ -98,8 +91,6 @@ def start_state(table: Params) -> Ints:
 
     The last two are lines of hexadecimal digits, one byte a context.
     """
-    from mcz.codecs.coding import mixing
-
     probabilities = np.frombuffer(bytes.fromhex("".join(table["probabilities"])), "u1")
     counts = np.frombuffer(bytes.fromhex("".join(table["counts"])), "u1")
     state = np.zeros(mixing.MODELS + 2 * len(probabilities), np.int64)

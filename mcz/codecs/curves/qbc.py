@@ -29,6 +29,7 @@ from mcz.codecs.contract import (
     SignalSource,
     Span,
 )
+from mcz.codecs.curves import kernels
 from mcz.codecs.curves.choices import (
     BREAKS,
     LEAST_STEP,
@@ -181,8 +182,6 @@ def marks_of(first: int, stop: int, n_frames: int, delta: int) -> Ints:
 
 def _joint_streams(points: Floats, marks: Ints, stop: int, plan: Plan) -> tuple[bytes, bytes]:
     """The two streams of a joint; ``marks`` counted from the segment's first frame."""
-    from mcz.codecs.curves import kernels
-
     points = np.ascontiguousarray(points)
     rounded = plan.points(plan.indices(points)) if plan.closed else points
     find = kernels.breaks_of_fewest if plan.fewest else kernels.breaks_by_splitting
@@ -246,8 +245,6 @@ def _read_segment(
     request: Request,
     fetch: Fetch,
 ) -> None:
-    from mcz.codecs.curves import kernels
-
     span = spans[index]
     start, stop = max(span.first, request.start), min(span.stop, request.stop)
     frames = marks_of(span.first, span.stop, fields.coded_frames, fields.delta)

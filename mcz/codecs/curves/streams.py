@@ -6,8 +6,6 @@ SPEC.md, "Codec 17: qbc", is normative; names are its field names.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +18,7 @@ from mcz.codecs.coding.streams import (
     scale_of,
     start_states,
 )
+from mcz.codecs.curves import kernels
 from mcz.errors import FormatError
 from mcz.model.types import Ints
 
@@ -36,13 +35,6 @@ class Curves:
     mids: Ints  # (curves, channels)
 
 
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.curves import kernels
-
-    return kernels
-
-
 def _halves(errors: Ints) -> int:
     """The byte of a scale of about the mean absolute error."""
     return halves_of(float(np.abs(errors).mean()) if errors.size else 0.0, MAX_SCALE)
@@ -53,12 +45,11 @@ def build_marks(points: Ints) -> bytes:
     if not points.any():
         return b""
     halves = _halves(np.diff(points, axis=0))
-    loops = _kernels()
     body = encode_stream(
         start_states("qbc")[MARKS],
         4 * points.size + 256,
         lambda state, data: (
-            loops.code_marks(state, data, points.copy(), len(points), scale_of(halves)) < 0
+            kernels.code_marks(state, data, points.copy(), len(points), scale_of(halves)) < 0
         ),
         "qbc: a mark",
     )
@@ -71,11 +62,10 @@ def parse_marks(stream: bytes, count: int, n_channels: int, name: str) -> Ints:
     if not stream:
         return points
     halves = _scale(stream, 0, name)
-    loops = _kernels()
     decode_stream(
         stream[1:],
         start_states("qbc")[MARKS],
-        lambda state, data: loops.code_marks(state, data, points, count, scale_of(halves)) < 0,
+        lambda state, data: kernels.code_marks(state, data, points, count, scale_of(halves)) < 0,
         f"{name}: a mark",
         whole=True,  # QBC-15
     )
@@ -87,11 +77,10 @@ def parse_first_mark(stream: bytes, n_channels: int, name: str) -> Ints:
     points = np.zeros((1, n_channels), np.int64)
     if stream:
         _scale(stream, 0, name)
-        loops = _kernels()
         decode_stream(
             stream[1:],
             bare_state(),
-            lambda state, data: loops.code_marks(state, data, points, 1, 1) < 0,
+            lambda state, data: kernels.code_marks(state, data, points, 1, 1) < 0,
             f"{name}: a mark",
             whole=False,
         )
@@ -114,12 +103,11 @@ def build_curves(marks: Ints, frames: Ints, curves: Curves) -> bytes:
     bends = (curves.mids - ((starts + curves.ends) >> 1))[curves.lengths > 1]
     halves = np.array([_halves(steps // 2), _halves(bends)])
     scales = np.array([scale_of(int(h)) for h in halves])
-    loops = _kernels()
     body = encode_stream(
         start_states("qbc")[DETAILS],
         8 * curves.ends.size + 4 * len(curves.lengths) + 256,
         lambda state, data: (
-            loops.code_details(
+            kernels.code_details(
                 state,
                 data,
                 marks,
@@ -146,10 +134,9 @@ def parse_curves(stream: bytes, marks: Ints, frames: Ints, name: str, *, whole: 
     ends = np.zeros((most, marks.shape[1]), np.int64)
     mids = np.zeros_like(ends)
     n_curves = [0]
-    loops = _kernels()
 
     def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
-        n_curves[0] = loops.code_details(state, data, marks, frames, lengths, ends, mids, scales)
+        n_curves[0] = kernels.code_details(state, data, marks, frames, lengths, ends, mids, scales)
         return n_curves[0] >= 0
 
     # QBC-15

@@ -10,13 +10,19 @@ predicted from those before it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, partial
-from types import ModuleType
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding import regression
+from mcz.codecs.coding.fast import (
+    head_kernels,
+    residual_kernels,
+    survey_kernels,
+    tail_kernels,
+    write_kernels,
+)
 from mcz.codecs.coding.fast.decoder import (
     MOST_ROWS,
     SegmentDecoder,
@@ -25,9 +31,10 @@ from mcz.codecs.coding.fast.decoder import (
     read_segments,
 )
 from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
-from mcz.codecs.coding.fast.encoder import kernels as fast_kernels
 from mcz.codecs.coding.fast.lanes import fault_of
+from mcz.codecs.coding.fast.residual_kernels import Predictors
 from mcz.codecs.coding.forms import WITH_UNIT
+from mcz.codecs.coding.regression import Regressions
 from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import (
     Codec,
@@ -40,6 +47,8 @@ from mcz.codecs.contract import (
     Span,
     refuse_extras,
 )
+from mcz.codecs.lossless import best_kernels
+from mcz.codecs.lossless.best_kernels import Rests
 from mcz.codecs.lossless.echoes import (
     Echo,
     build_echoes,
@@ -54,12 +63,6 @@ from mcz.model.numbers import Grid
 from mcz.model.schema import varint
 from mcz.model.threads import thread_limit
 from mcz.model.types import Ints, Params
-
-if TYPE_CHECKING:
-    from mcz.codecs.coding.fast.residual_kernels import Predictors
-    from mcz.codecs.coding.regression import Regressions
-    from mcz.codecs.lossless.best_kernels import Rests
-
 
 SIZING = Sizing(60_500, 65_000, value_bytes=1.5, most_rows=MOST_ROWS, spare=1, full=True)
 
@@ -123,25 +126,14 @@ AS_FAST, PREDICTED, ECHOED = range(3)  # method
 WORK, SPARE = 64, 1024  # references x rows that a byte is worth; spare bytes
 
 
-@cache
-def kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
-    """The compiled loops, imported on first use: of best, regressions, residuals of fast."""
-    from mcz.codecs.coding import regression
-    from mcz.codecs.coding.fast import residual_kernels
-    from mcz.codecs.lossless import best_kernels
-
-    return best_kernels, regression, residual_kernels
-
-
 def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> bytes:
     """Build the shortest stream; ``ordinals`` (rows, channels), ``grids`` in force."""
     builder = StreamBuilder(layout.grids, layout.groups)
     plan = builder.plan(ordinals, grids)
     streams: list[bytes] = []
     if len(plan.lanes.numbers):
-        own = kernels()[0]
         leads = np.ascontiguousarray(plan.lanes.leads.T)
-        chosen = choose_references(leads, own.MOST_REFERENCES, own.MOST_IN_ALL)
+        chosen = choose_references(leads, best_kernels.MOST_REFERENCES, best_kernels.MOST_IN_ALL)
         echoes = _echoes_of(plan, leads)
         for repeated in ([], echoes) if echoes else ([],):
             stream = code_plan(plan, chosen, repeated)
@@ -154,10 +146,9 @@ def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> byt
 
 def _echoes_of(plan: Plan, leads: Words) -> list[Echo]:
     """Find echoes in the lanes whose ordinals equal their leads and tails."""
-    _, tail, survey, *_ = fast_kernels()
     numbers = plan.lanes.numbers
-    is_whole = plan.channels.plans[numbers, survey.LIMIT] < 0
-    is_usable = is_whole & (plan.lanes.lattices[:, tail.REST] < 0)
+    is_whole = plan.channels.plans[numbers, survey_kernels.LIMIT] < 0
+    is_usable = is_whole & (plan.lanes.lattices[:, tail_kernels.REST] < 0)
     columns = plan.channels.numbers[numbers]
     return find_echoes(plan.channels.ordinals[:, columns], leads, np.flatnonzero(is_usable))
 
@@ -168,18 +159,20 @@ def _work(references: Sequence[Sequence[int]], n_rows: int) -> int:
 
 def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[Echo]) -> bytes:
     """The stream of method 1, or of method 2 with echoes, of at least one lane."""
-    own, _, residual = kernels()
-    head, tail, *_, write = fast_kernels()
     coded, columns = plan.lanes, plan.channels.columns
     n_lanes, n_rows = coded.leads.shape
     table = echo_table(echoes, n_rows, n_lanes)
-    lanes = residual.predictors_of(n_lanes)
+    lanes = residual_kernels.predictors_of(n_lanes)
     lanes.first[:], lanes.scales[:] = coded.leads[:, 0], coded.scales
-    taps = plan.channels.plans[coded.numbers, head.TAPS : head.TAPS + head.N_TAPS]
+    taps = plan.channels.plans[
+        coded.numbers, head_kernels.TAPS : head_kernels.TAPS + head_kernels.N_TAPS
+    ]
     lanes.behind[:] = np.diff(taps, axis=1, prepend=0, append=0).T
-    leads = np.zeros((residual.BEHIND + n_rows, n_lanes), np.int32)
-    leads[residual.BEHIND :] = coded.leads.T
-    rests = own.Rests(np.zeros((n_rows, n_lanes), np.int32), coded.lattices[:, tail.REST].copy())
+    leads = np.zeros((residual_kernels.BEHIND + n_rows, n_lanes), np.int32)
+    leads[residual_kernels.BEHIND :] = coded.leads.T
+    rests = best_kernels.Rests(
+        np.zeros((n_rows, n_lanes), np.int32), coded.lattices[:, tail_kernels.REST].copy()
+    )
     has_rests = rests.scales >= 0
     rests.values[:, has_rests] = columns[coded.numbers[has_rests]].T
     model = _Model(lanes, table, leads, rests)
@@ -190,8 +183,8 @@ def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[
     )
     residuals = (build_echoes(echoes) if echoes else b"") + bits
     room = np.empty(plan.most_bytes, np.uint8)
-    heads = room[: write.write_heads(plan.channels, 0, plan.fields, room)].tobytes()
-    tails = room[: own.write_tails(coded, columns, table, room)].tobytes()
+    heads = room[: write_kernels.write_heads(plan.channels, 0, plan.fields, room)].tobytes()
+    tails = room[: best_kernels.write_tails(coded, columns, table, room)].tobytes()
     method = bytes((ECHOED if echoes else PREDICTED,))
     return b"".join((method, heads, varint(len(residuals)), residuals, tails))
 
@@ -201,29 +194,27 @@ class _Model:
 
     def __init__(self, lanes: Predictors, echoes: Ints, leads: Words, rests: Rests) -> None:
         self.lanes, self.echoes, self.leads, self.rests = lanes, echoes, leads, rests
-        n_lanes, most = leads.shape[1], kernels()[0].MOST_REFERENCES
+        n_lanes, most = leads.shape[1], best_kernels.MOST_REFERENCES
         # their number, then the references
         self.references = np.zeros((n_lanes, 1 + most), np.int64)
         self.most_work: int | None = None  # of references x rows, for a decoder
 
     def run(self, state: Ints, data: Bytes) -> bool:
         """Code references, leads and rests in place; False if one of them has no code."""
-        own, _, residual = kernels()
-        total = own.code_references(state, data, self.references)
+        total = best_kernels.code_references(state, data, self.references)
         if total < 0:
             return False
-        work = (len(self.references) + total) * (len(self.leads) - residual.BEHIND)
+        work = (len(self.references) + total) * (len(self.leads) - residual_kernels.BEHIND)
         if self.most_work is not None and work > self.most_work:  # BEST-12
             raise FormatError("best: too many references for the size of the stream")
         args = state, data, self.lanes, self.references, self._regressions(), self.echoes
         with np.errstate(all="ignore"):  # an estimate may be NaN
-            return bool(own.code_leads(*args, self.leads, self.rests) < 0)
+            return bool(best_kernels.code_leads(*args, self.leads, self.rests) < 0)
 
     def _regressions(self) -> Regressions:
-        own, regression, _ = kernels()
         sizes: list[int] = []
         for n in self.references[:, 0].tolist():
-            sizes += own.n_linear(n), own.n_quadratic(n), own.N_BLENDED
+            sizes += best_kernels.n_linear(n), best_kernels.n_quadratic(n), best_kernels.N_BLENDED
         result: Regressions = regression.regressions_of(sizes)
         return result
 
@@ -236,7 +227,6 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     if stream[0] == AS_FAST:
         read_segments([decoder])
         return
-    own, _, residual = kernels()
     lanes = decoder.lanes
     n_lanes = len(lanes.columns)
     if n_lanes == 0:  # BEST-04
@@ -245,8 +235,10 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
         raise FormatError("best: no channel may have a parent")
     (start, stop), (tail, end) = lanes.residuals[0] // 8, lanes.tails[0]
     bits = lanes.data[start:stop].tobytes()
-    rests = own.Rests(np.zeros((len(out), n_lanes), np.int32), lanes.lattices[:, own.REST].copy())
-    lanes.lattices[:, own.REST] = -1  # tails have none
+    rests = best_kernels.Rests(
+        np.zeros((len(out), n_lanes), np.int32), lanes.lattices[:, tail_kernels.REST].copy()
+    )
+    lanes.lattices[:, tail_kernels.REST] = -1  # tails have none
     echoes: list[Echo] = []
     if stream[0] == ECHOED:
         echoes, at = read_echoes(bits, len(out), (rests.scales < 0).tolist())
@@ -257,10 +249,12 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     model.most_work = WORK * (len(stream) + SPARE)
     start = start_states("best")[0]  # BEST-06
     decode_stream(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
-    tails = own.Tails(lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns)
-    leads = lanes.leads[residual.BEHIND :]
+    tails = tail_kernels.Tails(
+        lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns
+    )
+    leads = lanes.leads[residual_kernels.BEHIND :]
     given = _exact_echoes(table, decoder)
-    fault = own.read_ordinals(tails, lanes.lattices, leads, given, decoder.rows)
+    fault = best_kernels.read_ordinals(tails, lanes.lattices, leads, given, decoder.rows)
     if fault != -1:
         raise fault_of("tails", "lane", fault)
     for lane in np.flatnonzero(rests.scales >= 0).tolist():
@@ -270,6 +264,5 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
 
 def _exact_echoes(table: Ints, decoder: SegmentDecoder) -> Ints:
     """The places of ``table`` whose ordinals echoes determine: in units an ordinal is its lead."""
-    head = fast_kernels()[0]
-    forms = decoder.heads.plans[decoder.lanes.columns, head.FORM]
+    forms = decoder.heads.plans[decoder.lanes.columns, head_kernels.FORM]
     return np.where(np.isin(forms, WITH_UNIT), 0, table)

@@ -6,21 +6,22 @@ SPEC.md, "Codec 21: online", is normative; the names below are its field names.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from construct import Int8ul
 from numpy.typing import NDArray
 
+from mcz.codecs.coding import mixing
+from mcz.codecs.coding.space_kernels import Transform
 from mcz.codecs.coding.streams import start_states
 from mcz.codecs.contract import Layout
+from mcz.codecs.online import kernels
 from mcz.codecs.online.units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
 from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, Space, SpaceFields, space_of
 from mcz.errors import FormatError, LostFrameError, MotionError
 from mcz.model.schema import Record, field, one_of, parse
-from mcz.model.types import Floats
+from mcz.model.types import Floats, Ints
 
 NAME = "online"
 N_KINDS = 2  # start tables of a coder: for intra coded LTRs, and others
@@ -39,20 +40,6 @@ class OnlineHeader(Record):
     coder: int = field(
         one_of(Int8ul, (MIXED, GOLOMB)), "how coefficients become bits: 0 mixed, 1 Golomb"
     )
-
-
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.online import kernels
-
-    return kernels
-
-
-@cache
-def _coding() -> ModuleType:
-    from mcz.codecs.coding import mixing
-
-    return mixing
 
 
 def parse_online_header(header: bytes) -> OnlineHeader:
@@ -93,9 +80,9 @@ class Coder:
         self._state = start_states("online")[N_KINDS * self.coder].copy()
         self._values = np.zeros(len(self.space.weights))
         self._reference = np.zeros(len(self.space.weights))
-        self._memory = np.zeros(_kernels().N_MEMORY, np.int64)
+        self._memory = np.zeros(kernels.N_MEMORY, np.int64)
         self._lengths = np.zeros(len(self.space.starts) - 1, np.int64)
-        self._tracks = np.zeros((self.space.n_rows, _kernels().TRACK_SIZE), np.int64)
+        self._tracks = np.zeros((self.space.n_rows, kernels.TRACK_SIZE), np.int64)
         self._analysis = np.zeros((0, 0))
 
     def skip(self, n_frames: int) -> None:
@@ -120,11 +107,11 @@ class Coder:
             self._check(unit)
             self._begin(unit.kind)
             data = np.frombuffer(unit.data, np.uint8).copy()
-            _coding().start(self._state, data, 0)
-            fault = _kernels().decode_frames(*self._kernel_arguments(data, unit.kind, out))
+            mixing.start(self._state, data, 0)
+            fault = kernels.decode_frames(*self._kernel_arguments(data, unit.kind, out))
             if fault >= 0:
                 raise FormatError(f"{NAME}: frame {self.at + fault} is out of range")
-            if _coding().coded_size(self._state) != len(data):  # ONLINE-23
+            if mixing.coded_size(self._state) != len(data):  # ONLINE-23
                 raise FormatError(
                     f"{NAME}: the unit at frame {self.at} should not have {len(data)} bytes"
                 )
@@ -154,18 +141,18 @@ class Coder:
             self._analysis = np.ascontiguousarray(np.concatenate(self.space.analysis()))
         self._begin(kind)
         data = np.empty(len(frames) * (COEFFICIENT_BYTES * self.space.n_rows + 64), np.uint8)
-        _coding().start(self._state, data, 1)
+        mixing.start(self._state, data, 1)
         before = plan.numbers.copy()
-        choice = _kernels().Choice(
+        choice = kernels.Choice(
             self._analysis, threshold, n_group, plan.numbers, plan.laplace, plan.gauss
         )
-        fault = _kernels().encode_frames(*self._kernel_arguments(data, kind, frames), choice)
+        fault = kernels.encode_frames(*self._kernel_arguments(data, kind, frames), choice)
         if fault >= 0:
             plan.numbers[:] = before
             raise MotionError(
                 f"{NAME}: a coefficient of frame {self.at + fault} exceeds 2^40 quantizer steps"
             )
-        coded = data[: _coding().finish(self._state, data)].tobytes()
+        coded = data[: mixing.finish(self._state, data)].tobytes()
         if len(frames) == n_group:
             plan.round_up(len(coded))
         unit = Unit(kind, len(frames), coded, self.distance() if kind == LTR else 0)
@@ -185,8 +172,8 @@ class Coder:
 
     def _kernel_arguments(
         self, data: NDArray[np.uint8], kind: int, frames: Floats
-    ) -> tuple[Any, ...]:
-        past = _kernels().Past(
+    ) -> tuple[Ints, NDArray[np.uint8], int, int, Floats, kernels.Past, Transform]:
+        past = kernels.Past(
             self._values, self._reference, self._memory, self._lengths, self._tracks
         )
         return self._state, data, self.coder, kind, frames, past, self.space.transform()

@@ -11,12 +11,12 @@ import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
-from types import ModuleType
 
 import numpy as np
 
 from mcz.codecs import space_choices
 from mcz.codecs.contract import Layout
+from mcz.codecs.online import rate_kernels
 from mcz.codecs.online.coder import AS_IS, NAME, REORDERED
 from mcz.codecs.online.units import MODES
 from mcz.codecs.parameters import Parameter, choice, integer, number
@@ -43,29 +43,28 @@ class Plan:
 
     def round_up(self, n_bytes: int) -> None:
         """Account for a group of this many bytes."""
-        kernels = _kernels()
-        more = 8 * n_bytes - self.numbers[kernels.SPENT]
-        self.numbers[kernels.SPENT] += more
-        self.numbers[kernels.AHEAD] += more
+        more = 8 * n_bytes - self.numbers[rate_kernels.SPENT]
+        self.numbers[rate_kernels.SPENT] += more
+        self.numbers[rate_kernels.AHEAD] += more
 
     def charge(self, n_bytes: int, *, intra: bool) -> None:
         """Account for the last frame of a live stream: its bytes with framing."""
-        kernels, numbers = _kernels(), self.numbers
-        framing = 8.0 * n_bytes - numbers[kernels.LAST]
-        numbers[kernels.SPENT] += framing - numbers[kernels.RESERVED]
-        usual = numbers[kernels.FRAMING]
+        numbers = self.numbers
+        framing = 8.0 * n_bytes - numbers[rate_kernels.LAST]
+        numbers[rate_kernels.SPENT] += framing - numbers[rate_kernels.RESERVED]
+        usual = numbers[rate_kernels.FRAMING]
         if intra:  # it has a clip header before it, which all frames up to the next one pay for
             more = framing - usual
-            if numbers[kernels.PERIOD] > 0:
-                numbers[kernels.EXTRA] += more
-                numbers[kernels.OWED] += more
+            if numbers[rate_kernels.PERIOD] > 0:
+                numbers[rate_kernels.EXTRA] += more
+                numbers[rate_kernels.OWED] += more
                 framing = usual
         else:
-            share = kernels.FOLLOW / numbers[kernels.BUFFER] if usual else 1.0
-            numbers[kernels.FRAMING] += (framing - usual) * min(share, 1.0)
-        rate = numbers[kernels.GROUP_BITS] / numbers[kernels.GROUP_FRAMES]
-        ahead = numbers[kernels.AHEAD] + framing
-        numbers[kernels.AHEAD] = min(ahead, rate * numbers[kernels.BUFFER])
+            share = rate_kernels.FOLLOW / numbers[rate_kernels.BUFFER] if usual else 1.0
+            numbers[rate_kernels.FRAMING] += (framing - usual) * min(share, 1.0)
+        rate = numbers[rate_kernels.GROUP_BITS] / numbers[rate_kernels.GROUP_FRAMES]
+        ahead = numbers[rate_kernels.AHEAD] + framing
+        numbers[rate_kernels.AHEAD] = min(ahead, rate * numbers[rate_kernels.BUFFER])
 
 
 def plan_of(chosen: Params, layout: Layout, step: float) -> Plan:
@@ -73,17 +72,18 @@ def plan_of(chosen: Params, layout: Layout, step: float) -> Plan:
 
     Raises OptionError for a rate if the frame rate is unknown.
     """
-    kernels = _kernels()
     laplace, gauss = rates()
-    plan = Plan(np.zeros(kernels.PLAN_SIZE), laplace, gauss)
-    plan.numbers[[kernels.LTR_VARIANCE, kernels.STR_VARIANCE, kernels.LTR_BITS]] = kernels.UNKNOWN
+    plan = Plan(np.zeros(rate_kernels.PLAN_SIZE), laplace, gauss)
+    plan.numbers[[rate_kernels.LTR_VARIANCE, rate_kernels.STR_VARIANCE, rate_kernels.LTR_BITS]] = (
+        rate_kernels.UNKNOWN
+    )
     set_plan(plan, chosen, layout, step)
     return plan
 
 
 def set_plan(plan: Plan, chosen: Params, layout: Layout, step: float) -> None:
     """Apply changed parameters from the next group on."""
-    kernels, numbers = _kernels(), plan.numbers
+    numbers = plan.numbers
     mode = chosen["rate_control"]
     if mode != "mod":
         if layout.frame_rate is None or not layout.frame_rate:
@@ -92,31 +92,30 @@ def set_plan(plan: Plan, chosen: Params, layout: Layout, step: float) -> None:
                 hint=Hint.RATE,
             )
         per_frame = float(Fraction(1000) / layout.frame_rate)
-        numbers[kernels.BUFFER] = max(1.0, chosen["buffer"] * float(layout.frame_rate))
-        numbers[kernels.GROUP_BITS] = chosen["bitrate"] * per_frame * chosen["gof"]
+        numbers[rate_kernels.BUFFER] = max(1.0, chosen["buffer"] * float(layout.frame_rate))
+        numbers[rate_kernels.GROUP_BITS] = chosen["bitrate"] * per_frame * chosen["gof"]
     unit = layout.skeleton.unit_cm if layout.skeleton is not None else None
     is_derived = layout.skeleton is not None and layout.skeleton.base is not None
     slope, offset = FITS["bvh" if is_derived else "c3d"]
-    numbers[kernels.AHEAD] += numbers[kernels.OWED]
-    numbers[kernels.OWED] = numbers[kernels.EXTRA] = 0.0
-    numbers[kernels.MODE] = MODES.index(mode)
-    numbers[kernels.GROUP_FRAMES] = chosen["gof"]
-    numbers[kernels.PERIOD] = chosen["intra_period"]
-    numbers[kernels.LTR_SHIFT] = math.log2(chosen["ltr_step"])
+    numbers[rate_kernels.AHEAD] += numbers[rate_kernels.OWED]
+    numbers[rate_kernels.OWED] = numbers[rate_kernels.EXTRA] = 0.0
+    numbers[rate_kernels.MODE] = MODES.index(mode)
+    numbers[rate_kernels.GROUP_FRAMES] = chosen["gof"]
+    numbers[rate_kernels.PERIOD] = chosen["intra_period"]
+    numbers[rate_kernels.LTR_SHIFT] = math.log2(chosen["ltr_step"])
     floor = FLOOR_STEPS if unit is None else FLOOR_CM / unit / step
-    numbers[kernels.FLOOR] = min(max(floor, LEAST_FLOOR), 1 / LEAST_FLOOR) ** 2
-    numbers[kernels.ALPHA] = chosen["alpha"]
-    numbers[kernels.SLOPE] = slope if chosen["a"] is None else chosen["a"]
-    numbers[kernels.OFFSET] = offset if chosen["b"] is None else chosen["b"]
+    numbers[rate_kernels.FLOOR] = min(max(floor, LEAST_FLOOR), 1 / LEAST_FLOOR) ** 2
+    numbers[rate_kernels.ALPHA] = chosen["alpha"]
+    numbers[rate_kernels.SLOPE] = slope if chosen["a"] is None else chosen["a"]
+    numbers[rate_kernels.OFFSET] = offset if chosen["b"] is None else chosen["b"]
     if mode == "mod":
-        numbers[kernels.BASE] = math.log2((chosen["step"] or step) / step)
+        numbers[rate_kernels.BASE] = math.log2((chosen["step"] or step) / step)
 
 
 @cache
 def rates() -> tuple[Floats, Floats]:
     """Bits of a quantized Laplacian and Gaussian, by log2 of the step over the deviation."""
-    kernels = _kernels()
-    at = 2.0 ** (np.arange(kernels.N_RATES) / kernels.PER_OCTAVE - kernels.LOW)
+    at = 2.0 ** (np.arange(rate_kernels.N_RATES) / rate_kernels.PER_OCTAVE - rate_kernels.LOW)
     tables = tuple(np.array([bits(float(x)) for x in at]) for bits in (laplacian, gaussian))
     return tables[0], tables[1]
 
@@ -155,13 +154,6 @@ def gaussian(step: float) -> float:
             break
         total -= (2 if k else 1) * p * math.log2(p)
     return max(total, 0.0)
-
-
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.online import rate_kernels
-
-    return rate_kernels
 
 
 MOST_GOF = 2**20

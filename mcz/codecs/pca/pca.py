@@ -33,6 +33,7 @@ from mcz.codecs.parameters import (
     preset_values,
     ratio_of,
 )
+from mcz.codecs.pca import kernels
 from mcz.codecs.pca.streams import MAX_INDEX, MAX_SHIFT, Components, build_stream, parse_stream
 from mcz.codecs.segments import (
     SEGMENT_FRAMES,
@@ -127,8 +128,6 @@ def _check(layout: Layout, spans: Sequence[Span]) -> None:
 
 def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, n_frames: int) -> Floats:
     """The first ``n_frames`` frames of a segment."""
-    from mcz.codecs.pca import kernels
-
     scaled = decimals == SCALED
     parts = parse_stream(stream, layout.n_channels, span.n_frames, n_frames, scaled=scaled)
     if scaled:

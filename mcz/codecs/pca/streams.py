@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.residuals import code_table
 from mcz.codecs.coding.streams import (
     choose_predictor,
     decode_stream,
@@ -18,6 +19,7 @@ from mcz.codecs.coding.streams import (
     scale_of,
     start_states,
 )
+from mcz.codecs.pca.kernels import code_coefficients
 from mcz.errors import FormatError, MotionError
 from mcz.model.schema import read_varint, varint
 from mcz.model.types import Ints
@@ -116,9 +118,6 @@ def _loop(
     mean_scale: int,
 ) -> bool:
     """Code all of a segment; ``sides`` are its shifts and forms."""
-    from mcz.codecs.coding.residuals import code_table
-    from mcz.codecs.pca.kernels import code_coefficients
-
     count, n_channels = basis.shape
     scales = np.array([scale_of(mean_scale)])
     if code_table(state, data, means[None], scales, 0):

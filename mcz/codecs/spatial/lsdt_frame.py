@@ -12,8 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cache
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +39,7 @@ from mcz.codecs.segments import (
     segments_by_halving,
 )
 from mcz.codecs.space import COURSES, MEAN, SpaceFields, check, space_of, uses_of
+from mcz.codecs.spatial import kernels
 from mcz.codecs.spatial.prefix_streams import (
     NO_CODES,
     CodeFields,
@@ -168,13 +167,6 @@ def uses(header: bytes) -> tuple[bytes, ...]:
     return uses_of(_header(header).space)
 
 
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.spatial import kernels
-
-    return kernels
-
-
 class _Coder:
     """Encoder and decoder state across frames.
 
@@ -197,7 +189,7 @@ class _Coder:
         self._models = start_states("frame")[0].copy()  # FRAME-07
         self._values = np.zeros(len(space.weights))
         self._lengths = np.zeros(len(space.starts) - 1, np.int64)
-        self._tracks = np.zeros((space.n_rows, _kernels().TRACK_SIZE), np.int64)
+        self._tracks = np.zeros((space.n_rows, kernels.TRACK_SIZE), np.int64)
         self._begins = 1
 
     def decode(self, stream: bytes, n_frames: int, n_decoded: int) -> Floats:
@@ -205,7 +197,7 @@ class _Coder:
         indices = np.zeros((n_decoded, self.space.n_rows), np.int64)
         self._parse(stream, indices, whole=n_decoded == n_frames)  # FRAME-10
         out = np.empty((n_decoded, len(self._values)))
-        _kernels().add_frames(out, self._values, indices, self.space.transform())
+        kernels.add_frames(out, self._values, indices, self.space.transform())
         return out
 
     def quantize(self, frames: Floats) -> Ints:
@@ -213,7 +205,7 @@ class _Coder:
         if not self._analysis.size:
             self._analysis = np.ascontiguousarray(np.concatenate(self.space.analysis()))
         indices = np.zeros((len(frames), self.space.n_rows), np.int64)
-        fault = _kernels().quantize_frames(
+        fault = kernels.quantize_frames(
             indices,
             np.ascontiguousarray(frames),
             self._values,
@@ -259,7 +251,7 @@ class _Coder:
 
     def _code(self, state: Ints, data: NDArray[np.uint8], indices: Ints) -> bool:
         memory = self._lengths, self._tracks, self._begins
-        fault = _kernels().code_frames(state, data, indices, self.space.starts, *memory)
+        fault = kernels.code_frames(state, data, indices, self.space.starts, *memory)
         self._models[:] = state
         return bool(fault < 0)
 

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from types import ModuleType
 
 import numpy as np
 from construct import If, Int8ul, this
 
 from mcz.codecs.coding.huffman import DIRECT, MAX_LENGTH, N_CLASSES, code_lengths, codes_of
+from mcz.codecs.spatial import prefix_kernels
 from mcz.errors import FormatError
 from mcz.model.schema import Checked, Record, counted, field, one_of
 from mcz.model.types import Ints
@@ -46,13 +45,6 @@ class Codes:
     values: Ints
 
 
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.spatial import prefix_kernels
-
-    return prefix_kernels
-
-
 def fields_of(blocks: Iterable[Ints]) -> CodeFields:
     """The fields of CODE with the best codes for these vectors, (n_vectors, n) each."""
     gaps, values = np.zeros(N_CLASSES, np.int64), np.zeros(N_CLASSES, np.int64)
@@ -81,19 +73,24 @@ def codes_from(fields: CodeFields, where: str) -> Codes | None:
 
 
 def _table(lengths: Sequence[int], where: str) -> Ints:
-    loops = _kernels()
-    table = np.zeros((loops.TABLE_ROWS, max(N_CLASSES, MAX_LENGTH + 1)), np.int64)
+    table = np.zeros((prefix_kernels.TABLE_ROWS, max(N_CLASSES, MAX_LENGTH + 1)), np.int64)
     n = len(lengths)
-    table[loops.CODES, :n], table[loops.LENGTHS, :n] = codes_of(lengths, where), lengths
-    own = table[loops.LENGTHS, :n]
+    table[prefix_kernels.CODES, :n], table[prefix_kernels.LENGTHS, :n] = (
+        codes_of(lengths, where),
+        lengths,
+    )
+    own = table[prefix_kernels.LENGTHS, :n]
     symbols = np.lexsort((np.arange(n), own))[np.count_nonzero(own == 0) :]
-    table[loops.SYMBOLS, : len(symbols)] = symbols
+    table[prefix_kernels.SYMBOLS, : len(symbols)] = symbols
     first = 0
     for length in range(1, MAX_LENGTH + 1):
         members = np.flatnonzero(own == length)
-        table[loops.ENTRIES, length], table[loops.COUNTS, length] = first, len(members)
+        table[prefix_kernels.ENTRIES, length], table[prefix_kernels.COUNTS, length] = (
+            first,
+            len(members),
+        )
         if len(members):
-            table[loops.FIRSTS, length] = table[loops.CODES, members[0]]
+            table[prefix_kernels.FIRSTS, length] = table[prefix_kernels.CODES, members[0]]
         first += len(members)
     return table
 
@@ -106,7 +103,7 @@ def build_vectors(rows: Ints, starts: Ints, codes: Codes) -> bytes:
     size = rows.size + 64
     while True:
         data, coder = np.zeros(size, np.uint8), np.array([0, 1])
-        _kernels().code_vectors(coder, data, rows.copy(), starts, codes.gaps, codes.values)
+        prefix_kernels.code_vectors(coder, data, rows.copy(), starts, codes.gaps, codes.values)
         used = -(-int(coder[0]) // 8)
         if used <= size:
             return data[:used].tobytes()
@@ -121,7 +118,7 @@ def parse_vectors(
     ``whole``: all bits of ``data`` must be needed. Raises FormatError on bad bytes.
     """
     stream, coder = np.frombuffer(data, np.uint8).copy(), np.array([0, 0])
-    fault = _kernels().code_vectors(coder, stream, rows, starts, codes.gaps, codes.values)
+    fault = prefix_kernels.code_vectors(coder, stream, rows, starts, codes.gaps, codes.values)
     used = int(coder[0])
     if fault >= 0 or used > 8 * len(data):  # BITS-02
         raise FormatError(f"{where} is not a valid code, or is out of range")

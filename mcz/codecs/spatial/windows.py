@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
-from types import ModuleType
+from functools import partial
 
 import numpy as np
 
@@ -29,6 +28,8 @@ from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import SEGMENT_FRAMES, TARGET_BYTES
 from mcz.codecs.space import Space, SpaceFields, check, space_of, uses_of
+from mcz.codecs.spatial import kernels
+from mcz.codecs.spatial.kernels import synthesize, synthesize_courses
 from mcz.codecs.spatial.prefix_streams import (
     NO_CODES,
     CodeFields,
@@ -204,8 +205,6 @@ def uses(header: bytes) -> tuple[bytes, ...]:
 
 def space_of_windows(fields: WindowsHeader, layout: Layout) -> Space:
     """Space of a header, with courses over a whole window."""
-    from mcz.codecs.spatial.kernels import synthesize_courses
-
     space = space_of(NAME, fields.space, layout)
     if space.courses is None:
         return space
@@ -231,8 +230,6 @@ def _segment(
     request: Request,
     out: Floats,
 ) -> None:
-    from mcz.codecs.spatial.kernels import synthesize
-
     n_windows = -(-span.n_frames // fields.window)
     where = f"{NAME}: segment at {span.first}"
     for number, part in enumerate(windows_of(stream, n_windows, where)):
@@ -281,13 +278,6 @@ class Window:
     lengths: Ints
 
 
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.spatial import kernels
-
-    return kernels
-
-
 def build_window(rows: Ints, starts: Ints, codes: Codes | None) -> bytes:
     """The bytes of a window's coefficients, (n_rows, n_frequencies), none beyond MAX_INDEX."""
     coded = _adaptive(rows, starts) if codes is None else build_vectors(rows, _starts(rows), codes)
@@ -303,7 +293,7 @@ def _adaptive(rows: Ints, starts: Ints) -> bytes:
     return encode_stream(
         start_states("window")[0],
         rows.size + 256,
-        lambda state, data: _kernels().code_window(state, data, rows, starts, lengths) < 0,
+        lambda state, data: kernels.code_window(state, data, rows, starts, lengths) < 0,
         "a coefficient",
     )
 
@@ -324,7 +314,7 @@ def parse_window(
             data,
             start_states("window")[0],  # WIND-10
             # WIND-10
-            lambda state, data: _kernels().code_window(state, data, rows, starts, lengths) < 0,
+            lambda state, data: kernels.code_window(state, data, rows, starts, lengths) < 0,
             f"{where}: a coefficient",
             whole=True,  # WIND-08
         )

@@ -5,19 +5,10 @@ SPEC.md, "Lifting", is normative: a signal is mirrored about its first and its l
 
 from __future__ import annotations
 
-from functools import cache
-from types import ModuleType
-
 import numpy as np
 
+from mcz.codecs.transforms import wavelet_kernels
 from mcz.model.types import Floats
-
-
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.transforms import wavelet_kernels
-
-    return wavelet_kernels
 
 
 def lengths(n_rows: int, levels: int) -> list[int]:
@@ -33,12 +24,12 @@ def split(signal: Floats) -> tuple[Floats, Floats]:
     n_rows, n_channels = signal.shape
     approx = np.empty(((n_rows + 1) // 2, n_channels))
     detail = np.empty((n_rows // 2, n_channels))
-    _kernels().split(signal.copy(), approx, detail)
+    wavelet_kernels.split(signal.copy(), approx, detail)
     return approx, detail
 
 
 def join(approx: Floats, detail: Floats) -> Floats:
     """The inverse of ``split``."""
     signal = np.empty((len(approx) + len(detail), approx.shape[1]))
-    _kernels().join(signal, approx, detail)
+    wavelet_kernels.join(signal, approx, detail)
     return signal

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcz.codecs.transforms.dct import dct_matrix
+from mcz.codecs.transforms.lsdt_kernels import truncate
 from mcz.errors import OptionError
 from mcz.model.types import Floats
 
@@ -73,8 +74,6 @@ def learn_basis(
     where there is no frame or a value is not finite, and for a sparsity, a number or a start that
     does not fit.
     """
-    from mcz.codecs.transforms.lsdt_kernels import truncate
-
     rows = _checked_frames(frames)
     n_points = rows.shape[1]
     _check_options(sparsity, iterations, growth, n_points)

@@ -14,6 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from mcz.codecs.transforms.post_filter_kernels import filter_middle
 from mcz.errors import MotionError, OptionError
 from mcz.model.types import Floats, Ints
 
@@ -89,8 +90,6 @@ def filter_rows(rows: Floats, rate: float, unit_cm: float) -> Floats:
 
 def _filter_middle(rows: Floats, past: Floats, bank: Floats, low: float, high: float) -> Floats:
     """All but the first and the last 12 of ``rows``, filtered; ``past`` is updated."""
-    from mcz.codecs.transforms.post_filter_kernels import filter_middle
-
     out = np.empty((len(rows) - 2 * DELAY, rows.shape[1]))
     filter_middle(rows, past, bank, low, high, out)
     return out

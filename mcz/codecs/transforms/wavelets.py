@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from types import ModuleType
 
 import numpy as np
 
+from mcz.codecs.transforms import wavelet_kernels
 from mcz.errors import FormatError, OptionError
 from mcz.model.types import Floats
 
@@ -238,13 +238,6 @@ def by_id(id_: int) -> Wavelet:
 Ranges = list[tuple[int, int]]
 
 
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.transforms import wavelet_kernels
-
-    return wavelet_kernels
-
-
 def own_range(first: int, stop: int, level: int, lengths: Sequence[int]) -> tuple[int, int]:
     """The coefficients of ``level`` that belong to the segment first <= frame < stop."""
     last = stop == lengths[0]  # MRDWT-14
@@ -280,7 +273,7 @@ def analyze(
         begin = 0 if have == 0 else (have + wavelet.n_taps - 1) // 2
         own = slice(start - begin, end - begin)
         approx, detail = np.zeros((2, last - begin, signal.shape[1]))
-        _kernels().analyze(approx, detail, signal, have, lengths[level - 1], begin, low, high)
+        wavelet_kernels.analyze(approx, detail, signal, have, lengths[level - 1], begin, low, high)
         details.append(detail[own])
         have, signal = begin, approx
     return [signal[own], *reversed(details)]
@@ -303,6 +296,6 @@ def synthesize(
         detail = bands[levels + 1 - level]
         begin, end = ranges[level - 1]
         finer = np.zeros((end - begin, signal.shape[1]))
-        _kernels().synthesize(finer, signal, detail, firsts[level - 1], begin, lo, hi)
+        wavelet_kernels.synthesize(finer, signal, detail, firsts[level - 1], begin, lo, hi)
         signal = finer
     return np.array(signal, order="C")

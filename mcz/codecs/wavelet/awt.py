@@ -32,7 +32,7 @@ from mcz.codecs.parameters import (
     preset_values,
 )
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
-from mcz.codecs.wavelet import wavelet
+from mcz.codecs.wavelet import kernels, wavelet
 from mcz.codecs.wavelet.reencode import recoder
 from mcz.codecs.wavelet.streams import DEAD_ZONE, LEAST_UNIT, Quantizer
 from mcz.codecs.wavelet.wavelet import (
@@ -193,8 +193,6 @@ def choose(
     are as good as zero if steps are as large as they. Raises MotionError for too large a
     coefficient.
     """
-    from mcz.codecs.wavelet import kernels
-
     n_bands = [len(band) for band in bands]
     sizes = np.abs(np.concatenate(bands)).T
     if not (sizes <= LARGEST).all():  # phrased so that NaN fails too: sums have overflowed

@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from types import ModuleType
 
 import numpy as np
 
@@ -22,6 +20,7 @@ from mcz.codecs.coding.streams import (
     start_states,
 )
 from mcz.codecs.parameters import code_of, ratio_of
+from mcz.codecs.wavelet import kernels
 from mcz.errors import FormatError, MotionError, OptionError
 from mcz.model.schema import read_varint, varint
 from mcz.model.types import Floats, Ints
@@ -43,13 +42,6 @@ class Coding:
     scaled: bool
     least: int
     shift: int
-
-
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.wavelet import kernels
-
-    return kernels
 
 
 def build_streams(bands: Sequence[Ints], step: int, coding: Coding) -> list[bytes]:
@@ -118,12 +110,11 @@ def _build_approximations(band: Ints, step: int, coding: Coding, has_details: bo
     if (band == band[0]).all():
         return bytes((CONSTANT,)) + codes + first
     predictor, halves = choose_predictor(band)
-    loops = _kernels()
     body = encode_stream(
         start_states("wavelet")[0],
         2 * len(band) + 256,
         lambda state, data: (
-            loops.code_approximations(
+            kernels.code_approximations(
                 state, data, band.copy(), len(band), predictor, scale_of(halves)
             )
             < 0
@@ -136,12 +127,11 @@ def _build_approximations(band: Ints, step: int, coding: Coding, has_details: bo
 def _build_details(band: Ints, coarser: Ints, number: int, coding: Coding) -> bytes:
     if not band.any():
         return b""
-    loops = _kernels()
     return encode_stream(
         start_states("wavelet")[number],
         2 * len(band) + 256,
         lambda state, data: (
-            loops.code_details(
+            kernels.code_details(
                 state, data, band.copy(), len(band), coarser, coding.shift, coding.least
             )
             < 0
@@ -177,12 +167,11 @@ def _parse_approximations(
             )
         return np.full(prefix, first, np.int64), step, True  # MRDWT-23
     band[:1] = first
-    loops = _kernels()
     decode_stream(
         stream[at:],
         start_states("wavelet")[0],  # MRDWT-30
         lambda state, data: (
-            loops.code_approximations(state, data, band, prefix, predictor, scale_of(halves)) < 0
+            kernels.code_approximations(state, data, band, prefix, predictor, scale_of(halves)) < 0
         ),
         f"{coding.name}: an approximation",
         whole=prefix == count,  # MRDWT-31
@@ -195,12 +184,11 @@ def _parse_details(
 ) -> Ints:
     band = np.zeros(prefix, np.int64)
     if stream:
-        loops = _kernels()
         decode_stream(
             stream,
             start_states("wavelet")[number],  # MRDWT-30
             lambda state, data: (
-                loops.code_details(state, data, band, prefix, coarser, coding.shift, coding.least)
+                kernels.code_details(state, data, band, prefix, coarser, coding.shift, coding.least)
                 < 0
             ),
             f"{coding.name}: a detail",

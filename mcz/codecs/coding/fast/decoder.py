@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from types import ModuleType
 
 import numpy as np
 
+from mcz.codecs.coding.fast import head_kernels, lane_kernels, residual_kernels, tail_kernels
 from mcz.codecs.coding.fast.lanes import Lanes, read_all
 from mcz.codecs.coding.forms import WITH_UNIT, form_of_grid
 from mcz.codecs.coding.forms.units import parse_mapping
@@ -41,14 +40,6 @@ FAULTS = (
     "its source is a copy",
     "its group has parents in more than two others",
 )
-
-
-@cache
-def kernels() -> tuple[ModuleType, ...]:
-    """The compiled loops, imported on first use: of heads, lanes, residuals and tails."""
-    from mcz.codecs.coding.fast import head_kernels, lane_kernels, residual_kernels, tail_kernels
-
-    return head_kernels, lane_kernels, residual_kernels, tail_kernels
 
 
 class Shape:
@@ -111,8 +102,7 @@ class Heads:
 
     def absent(self, kind: int) -> list[int]:
         """The groups that are not here and that copies or, of coded channels, parents are of."""
-        own = kernels()[0]
-        named = self.plans[self.plans[:, own.KIND] == kind, own.GROUP]
+        named = self.plans[self.plans[:, head_kernels.KIND] == kind, head_kernels.GROUP]
         return sorted(set(named[named >= 0].tolist()).difference(self.groups))
 
     def fault(self, channel: int, fault: int) -> FormatError:
@@ -131,17 +121,16 @@ def check_size(n_rows: int, n_channels: int, n_frames: int) -> None:
 
 def read_heads(shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int) -> Heads:
     """The heads of groups; raises FormatError for bad heads."""
-    own = kernels()[0]
     columns = shape.columns(groups)
     streams = [fetch(group) for group in groups]
     bounds = np.cumsum([0, *map(len, streams)])
     data = b"".join((*streams, bytes(SPARE)))
-    plans = np.zeros((len(columns.channels), own.PLAN_SIZE), np.int64)
+    plans = np.zeros((len(columns.channels), head_kernels.PLAN_SIZE), np.int64)
     parts = np.zeros((len(groups), 3), np.int64)
     parts[:, 2] = bounds[1:]
     heads = Heads(groups, columns, data, plans, parts)
     text = np.frombuffer(data, np.uint8)
-    channel, fault = own.read_heads(
+    channel, fault = head_kernels.read_heads(
         text, bounds, columns.firsts, n_rows, columns.forms, plans, parts
     )
     if channel >= 0:
@@ -156,14 +145,13 @@ def read_heads_of(
 
     Also the number of groups before the last.
     """
-    own = kernels()[0]
     heads = read_heads(shape, groups, fetch, n_rows)
     if len(groups) == len(shape.groups):
         return heads, len(groups)
-    if absent := heads.absent(own.COPY):
+    if absent := heads.absent(head_kernels.COPY):
         heads = read_heads(shape, (*groups, *absent), fetch, n_rows)
     n_whole = len(heads.groups)
-    if absent := heads.absent(own.CODED):
+    if absent := heads.absent(head_kernels.CODED):
         heads = read_heads(shape, (*heads.groups, *absent), fetch, n_rows)
     return heads, n_whole
 
@@ -175,10 +163,9 @@ class SegmentDecoder:
         self, shape: Shape, groups: tuple[int, ...], fetch: Fetch, out: Ints, n_rows: int
     ) -> None:
         """``out``: (rows, channels of ``groups``), of ``n_rows`` the first. Raises FormatError."""
-        lane = kernels()[1]
         heads, n_whole = read_heads_of(shape, groups, fetch, n_rows)
         columns = heads.columns
-        channel, fault = lane.link(
+        channel, fault = lane_kernels.link(
             heads.plans, columns.firsts, columns.groups, columns.places, len(groups), n_whole
         )
         if channel >= 0:
@@ -193,35 +180,35 @@ class SegmentDecoder:
         """Fill ``out``, after the lanes were decoded."""
         self._map_units()
         n_wanted = self.out.shape[1]
-        kernels()[1].fill_columns(self.lanes.data, self.heads.plans, n_wanted, self.rows)
+        lane_kernels.fill_columns(self.lanes.data, self.heads.plans, n_wanted, self.rows)
         if self.rows is not self.out:
             self.out[:] = self.rows[:, :n_wanted]
 
     def _map_units(self) -> None:
-        own, _, residual, _ = kernels()
         plans = self.heads.plans
         n_whole = len(self.lanes.tails)
         columns = self.lanes.columns[: self.lanes.starts[n_whole]]
-        forms = plans[columns, own.FORM]
+        forms = plans[columns, head_kernels.FORM]
         for number in np.flatnonzero((forms >= WITH_UNIT[0]) & (forms <= WITH_UNIT[-1])).tolist():
             plan, column = plans[columns[number]], self.rows[:, columns[number]]
             grid = self.shape.grids[self.heads.columns.channels[columns[number]]]
-            at, form = int(plan[own.FIELDS]), int(plan[own.FORM])
+            at, form = int(plan[head_kernels.FIELDS]), int(plan[head_kernels.FORM])
             mapping, has_rests, _ = parse_mapping(self.heads.data, at, form, grid)
             assert mapping is not None
-            leads = self.lanes.leads[residual.BEHIND :, number].astype(np.int64)
+            leads = self.lanes.leads[residual_kernels.BEHIND :, number].astype(np.int64)
             ordinals = mapping(leads)  # FAST-48, FAST-51, FAST-54
             column[:] = ordinals + column if has_rests else ordinals
 
 
 def _lanes_of(heads: Heads, n_whole: int, out: Ints, is_whole: bool) -> Lanes:
-    own, lane, residual, tail = kernels()
-    n_lanes = int(np.sum(heads.plans[:, own.KIND] == own.CODED))
+    n_lanes = int(np.sum(heads.plans[:, head_kernels.KIND] == head_kernels.CODED))
     starts, columns = np.empty(len(heads.groups) + 1, np.int64), np.empty(n_lanes, np.int64)
-    lattices = np.zeros((n_lanes, tail.LATTICE_SIZE), np.int64)
-    predictors = residual.predictors_of(n_lanes)
-    lane.fill_lanes(heads.plans, heads.columns.firsts, starts, predictors, lattices, columns)
-    leads = np.empty((residual.BEHIND + len(out), n_lanes), np.int32)
+    lattices = np.zeros((n_lanes, tail_kernels.LATTICE_SIZE), np.int64)
+    predictors = residual_kernels.predictors_of(n_lanes)
+    lane_kernels.fill_lanes(
+        heads.plans, heads.columns.firsts, starts, predictors, lattices, columns
+    )
+    leads = np.empty((residual_kernels.BEHIND + len(out), n_lanes), np.int32)
     bits = 8 * heads.parts
     data = np.frombuffer(heads.data, np.uint8)
     parts = bits[:, :2], bits[:n_whole, 1:]

@@ -7,13 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from types import ModuleType
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.fast import (
+    head_kernels,
+    parent_kernels,
+    plan_kernels,
+    survey_kernels,
+    tail_kernels,
+    write_kernels,
+)
+from mcz.codecs.coding.fast.survey_kernels import Channels, CodedLanes
 from mcz.codecs.coding.forms import BINARY32, form_of_grid, has_binary32, unit_grid
 from mcz.codecs.coding.forms.counts import may_be_counts
 from mcz.codecs.coding.forms.products import tiny_limit
@@ -21,31 +27,11 @@ from mcz.codecs.coding.forms.units import find_units
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Bools, Ints
 
-if TYPE_CHECKING:
-    from mcz.codecs.coding.fast.survey_kernels import Channels, CodedLanes
-
-
 FEWEST_ROWS = 32  # for a search of parents
 VALUE_BYTES = 20  # of a residual and a tail, of a run or of an exception, at most
 HEAD_BYTES = 128  # besides runs and exceptions, at most, and of the size of residuals
 SPARE = 16  # bytes after the last that are written to
 ANY = 2**62  # above all magnitudes
-
-
-@cache
-def kernels() -> tuple[ModuleType, ...]:
-    """The compiled loops, imported on first use: heads, tails, survey, plans, parents, streams."""
-    from mcz.codecs.coding.fast import (
-        head_kernels,
-        parent_kernels,
-        plan_kernels,
-        survey_kernels,
-        tail_kernels,
-        write_kernels,
-    )
-
-    choice = survey_kernels, plan_kernels, parent_kernels
-    return head_kernels, tail_kernels, *choice, write_kernels
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,42 +82,38 @@ class StreamBuilder:
         """The heads of a segment, without parents, and its lanes."""
         if grids != self._signal_grids:
             self._set_grids(grids)
-        _, _, survey, plan, _, _ = kernels()
         channels = self._channels(ordinals)
-        survey.survey(channels)
+        survey_kernels.survey(channels)
         rests, fields = self._find_units(channels)
-        survey.choose_steps(channels)
+        survey_kernels.choose_steps(channels)
         lanes = self._find_leads(channels)
         for n, column in rests.items():
             channels.columns[n] = column  # in the place of tails
-        plan.choose_predictors(lanes, channels.plans)
+        plan_kernels.choose_predictors(lanes, channels.plans)
         return Plan(channels, lanes, np.frombuffer(fields, np.uint8))
 
     def write(self, plan: Plan) -> tuple[bytes, ...]:
         """The streams of a plan with parents."""
-        *_, parent, write = kernels()
         if len(plan.lanes.numbers) > 1 and len(plan.channels.ordinals) >= FEWEST_ROWS:
-            parent.choose_parents(plan.lanes, plan.channels.plans)
+            parent_kernels.choose_parents(plan.lanes, plan.channels.plans)
         rooms = np.empty((3, plan.most_bytes), np.uint8)
         ends = np.empty(len(self.firsts) - 1, np.int64)
-        write.write_streams(plan.channels, plan.lanes, plan.fields, rooms, ends)
+        write_kernels.write_streams(plan.channels, plan.lanes, plan.fields, rooms, ends)
         stops = ends.tolist()
         starts = [0, *stops[:-1]]
         return tuple(rooms[0, a:b].tobytes() for a, b in zip(starts, stops, strict=False))
 
     def _channels(self, ordinals: Ints) -> Channels:
-        survey = kernels()[2]
         columns = np.empty((len(self.numbers), len(ordinals)), np.int64)
-        plans = np.zeros((len(self.numbers), survey.PLAN_SIZE), np.int64)
+        plans = np.zeros((len(self.numbers), survey_kernels.PLAN_SIZE), np.int64)
         numbers, firsts, groups = self.numbers, self.firsts, self.groups
         forms = self.forms, self.clip_forms
         given = ordinals, numbers, firsts, groups, *forms
-        result: Channels = survey.Channels(*given, columns, plans)
+        result: Channels = survey_kernels.Channels(*given, columns, plans)
         return result
 
     def _find_units(self, channels: Channels) -> tuple[dict[int, Ints], bytes]:
         """Code channels in units where possible; returns rests, and the fields of all units."""
-        head, _, survey, plan, _, _ = kernels()
         plans = channels.plans
         tried = self._find_candidates(channels)
         rests: dict[int, Ints] = {}
@@ -142,24 +124,32 @@ class StreamBuilder:
             if units is None:
                 continue
             leads, own, rest = units.integers, units.fields, units.rests
-            if int((leads ^ (leads >> 63)).max()) >> survey.LEAD_BITS:
+            if int((leads ^ (leads >> 63)).max()) >> survey_kernels.LEAD_BITS:
                 continue
             channels.columns[n] = leads
             rest_scale = -1
             if rest is not None:
                 rests[n] = rest
-                quarters = plan.byte_of(16 * float(np.abs(rest).mean()))
-                rest_scale, own = head.scale_of(quarters), own + bytes((quarters,))
-            plans[n, [head.FORM, head.REST, survey.LIMIT]] = units.form, rest_scale, -1
-            plans[n, [head.BASE, head.DIGITS, head.DROP, head.TOP]] = 0
-            plans[n, [head.FIELDS, survey.FIELDS_END]] = len(fields), len(fields) + len(own)
+                quarters = plan_kernels.byte_of(16 * float(np.abs(rest).mean()))
+                rest_scale, own = head_kernels.scale_of(quarters), own + bytes((quarters,))
+            plans[n, [head_kernels.FORM, head_kernels.REST, survey_kernels.LIMIT]] = (
+                units.form,
+                rest_scale,
+                -1,
+            )
+            plans[
+                n, [head_kernels.BASE, head_kernels.DIGITS, head_kernels.DROP, head_kernels.TOP]
+            ] = 0
+            plans[n, [head_kernels.FIELDS, survey_kernels.FIELDS_END]] = (
+                len(fields),
+                len(fields) + len(own),
+            )
             fields += own
         return rests, fields
 
     def _find_candidates(self, channels: Channels) -> Bools:
-        head, _, survey, _, _, _ = kernels()
-        is_coded = channels.plans[:, head.KIND] == head.CODED
-        is_small = channels.plans[:, survey.MOST] < self.unit_limits
+        is_coded = channels.plans[:, head_kernels.KIND] == head_kernels.CODED
+        is_small = channels.plans[:, survey_kernels.MOST] < self.unit_limits
         candidates: Bools = is_coded & is_small
         others = np.flatnonzero(is_coded & ~is_small & self.may_be_counts)
         grids = [self.grids[n] for n in others.tolist()]
@@ -168,19 +158,20 @@ class StreamBuilder:
 
     def _find_leads(self, channels: Channels) -> CodedLanes:
         """The coded channels, split into leads and tails, which replace their columns."""
-        head, tail, survey, _, _, write = kernels()
         plans = channels.plans
-        numbers = np.flatnonzero(plans[:, head.KIND] == head.CODED)
+        numbers = np.flatnonzero(plans[:, head_kernels.KIND] == head_kernels.CODED)
         starts = np.searchsorted(numbers, self.firsts)
-        lattices = np.zeros((len(numbers), tail.LATTICE_SIZE), np.int64)
-        lattices[:, : head.SCALE - head.BASE] = plans[numbers, head.BASE : head.SCALE]
+        lattices = np.zeros((len(numbers), tail_kernels.LATTICE_SIZE), np.int64)
+        lattices[:, : head_kernels.SCALE - head_kernels.BASE] = plans[
+            numbers, head_kernels.BASE : head_kernels.SCALE
+        ]
         leads, residuals = np.empty((2, len(numbers), len(channels.ordinals)), np.int32)
         costs, scales = np.zeros((2, len(numbers)), np.int64)
-        lanes: CodedLanes = survey.CodedLanes(
+        lanes: CodedLanes = survey_kernels.CodedLanes(
             numbers, starts, lattices, leads, residuals, costs, scales
         )
-        write.find_leads(lanes, channels.columns)
-        plans[numbers, head.TINY] = lattices[:, head.TINY - head.BASE]
+        write_kernels.find_leads(lanes, channels.columns)
+        plans[numbers, head_kernels.TINY] = lattices[:, head_kernels.TINY - head_kernels.BASE]
         return lanes
 
 

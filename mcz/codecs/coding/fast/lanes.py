@@ -8,20 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.coding.fast import residual_kernels as residual
 from mcz.codecs.coding.fast import tail_kernels as tail
+from mcz.codecs.coding.fast.residual_kernels import Predictors
 from mcz.errors import FormatError
 from mcz.kernels import lacks_compiled_kernels
 from mcz.model.types import Bools, Ints
-
-if TYPE_CHECKING:
-    from mcz.codecs.coding.fast.residual_kernels import Predictors
-
 
 Words = NDArray[np.uint64]
 

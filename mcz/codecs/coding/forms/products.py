@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from mcz.codecs.coding.forms import product_kernels
 from mcz.kernels import lacks_compiled_kernels
 from mcz.model.numbers import Grid, GridKind, values_of
 from mcz.model.numbers.magnitudes import POWERS
@@ -26,13 +27,11 @@ def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
 
     A code has a sign, and its size less 1 is q * shifts + z: it stands for (2q + 1) * 2^z units.
     """
-    from mcz.codecs.coding.forms import product_kernels as own  # on first use
-
     codes = np.ascontiguousarray(codes)
-    out = np.full(len(codes), own.PRINTED)
+    out = np.full(len(codes), product_kernels.PRINTED)
     all_printed = lacks_compiled_kernels() and bool((np.abs(codes) < EXACT_CODES).all())
-    if all_printed or own.fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
-        printed = out == own.PRINTED
+    if all_printed or product_kernels.fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
+        printed = out == product_kernels.PRINTED
         few, places = np.unique(codes[printed], return_inverse=True)  # often small ones
         out[printed] = grid.ordinals(multiples_of(few, shifts) * np.float64(unit))[0][
             places.ravel()
@@ -64,17 +63,17 @@ def find_products(ordinals: Ints, grid: Grid) -> tuple[float, int, Ints] | None:
     """A unit, shifts and the codes of these ordinals for ``of_products``, or None."""
     if not is_tiny(ordinals, grid):
         return None
-    from mcz.codecs.coding.forms import product_kernels as own  # on first use
-
     values = np.ravel(values_of(ordinals[:, None], (grid,)))
     codes = np.empty(len(values), np.int64)
     place = -1
     while True:
         start = place + 1
-        place, n_open = own.next_unit(values, ordinals, _UNITS, start, TENS, POWERS, grid.digits)
+        place, n_open = product_kernels.next_unit(
+            values, ordinals, _UNITS, start, TENS, POWERS, grid.digits
+        )
         if place == len(_UNITS):
             return None
         unit = float(_UNITS[place])
-        shifts = own.fill_codes(values, unit, codes)
+        shifts = product_kernels.fill_codes(values, unit, codes)
         if not n_open or (of_products(codes, unit, shifts, grid) == ordinals).all():
             return unit, shifts, codes
