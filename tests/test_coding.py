@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.fft import dct
 
 import mcz
-from mcz.codecs.coding.huffman import MAX_LENGTH, N_CLASSES, class_of, code_lengths, codes_of
-from mcz.codecs.spatial import prefix_streams as prefix
-from mcz.codecs.transforms.dct import dct_matrix
+from mcz.codecs.coding import prefix_codes as prefix
+from mcz.codecs.coding.prefix_codes import MAX_LENGTH, N_CLASSES, class_of, code_lengths, codes_of
+from mcz.codecs.transforms.bases import dct_matrix
 
 
 @pytest.mark.parametrize("n", [*range(1, 40), 60, 120, 240, 999, 2048])

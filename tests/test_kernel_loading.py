@@ -108,10 +108,10 @@ def test_an_edited_kernel_is_never_run_stale(installation: Installation) -> None
 def test_an_edited_constant_of_another_module_is_never_run_stale(
     installation: Installation,
 ) -> None:
-    installation.edit("codecs/coding/logistic.py", "COUNT_LIMIT = 250 ", "COUNT_LIMIT = 251 ")
+    installation.edit("codecs/coding/mixing.py", "COUNT_LIMIT = 250 ", "COUNT_LIMIT = 251 ")
     is_plain, sizes, (warned,) = installation.run()
     assert (is_plain, sizes) == (True, SIZES)
-    assert "mcz/codecs/coding/logistic.py is newer" in warned
+    assert "mcz/codecs/coding/mixing.py is newer" in warned
 
 
 DAMAGE = {

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcz.codecs import codec_by_id
-from mcz.codecs.coding import logistic, mixing, residuals, space_kernels
+from mcz.codecs import codec_by_id, space
+from mcz.codecs.coding import mixing, residuals
 from mcz.codecs.curves import kernels as qbc_kernels
 from mcz.codecs.online import kernels as online_kernels
 from mcz.codecs.posewave import header as posewave
@@ -84,14 +84,14 @@ def test_contexts_of_residuals() -> None:
 def test_nodes_of_the_mixer() -> None:
     text = re.search(r"NODES = ([\d\s]+)", SPEC)
     assert text is not None
-    assert tuple(map(int, text[1].split())) == logistic.NODES
+    assert tuple(map(int, text[1].split())) == mixing.NODES
 
 
 @pytest.mark.parametrize(
     ("heading", "words"),
     [
-        ("Entropy coding", f"if n < {logistic.COUNT_LIMIT}: n = n + 1"),
-        ("Entropy coding", f"clamp(dot, -{logistic.LIMIT}, {logistic.LIMIT})"),
+        ("Entropy coding", f"if n < {mixing.COUNT_LIMIT}: n = n + 1"),
+        ("Entropy coding", f"clamp(dot, -{mixing.LIMIT}, {mixing.LIMIT})"),
         ("Entropy coding", f"clamp(a.p, {mixing.LEAST_ONE}, {65536 - mixing.LEAST_ONE})"),
         ("Entropy coding", f"-2^{mixing.MAX_WEIGHT.bit_length() - 1}, 2^24)"),
         ("Residuals", "refuse if n > 53"),
@@ -132,9 +132,9 @@ def test_places_of_residuals_in_codecs() -> None:
     first = residuals.N_CONTEXTS, residuals.N_MIXERS
     second = 2 * first[0], 2 * first[1]
     assert ((0, 0), first, second) == (
-        space_kernels.LENGTHS,
-        space_kernels.FIRSTS,
-        space_kernels.OTHERS,
+        space.LENGTHS,
+        space.FIRSTS,
+        space.OTHERS,
     )
     assert f"context {first[0]} and mixer {first[1]}" in words_of("Space")
     assert f"context {second[0]} and mixer {second[1]}" in words_of("Space")

@@ -24,9 +24,9 @@ from mcz.codecs.training import (
     with_headings,
     with_mirror_images,
 )
-from mcz.codecs.transforms.dct import dct_matrix
-from mcz.codecs.transforms.lsdt import (
+from mcz.codecs.transforms.bases import (
     PATIENCE,
+    dct_matrix,
     haar_basis,
     has_converged,
     learn_bases,
@@ -126,7 +126,7 @@ def test_a_dictionary_of_sparse_frames_is_found(start: str) -> None:
 
 
 def test_of_equal_magnitudes_the_first_is_kept() -> None:
-    from mcz.codecs.transforms.lsdt_kernels import truncate
+    from mcz.codecs.transforms.bases import truncate
 
     rows = np.array([[1.0, -2.0, 2.0, -1.0], [3.0, 3.0, 3.0, 3.0]])
     products = np.empty((4, 4))

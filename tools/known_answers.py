@@ -1,27 +1,22 @@
-"""Make ``mcz/codecs/known_answer_table.py``: one small segment of every codec, and its values.
+"""Make ``mcz/codecs/known_answers.json``: one small segment of every codec, and its values.
 
 Run it where a codec's bitstream changes: ``python -m tools.known_answers``.
 """
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterator
-from dataclasses import replace
-from pathlib import Path
+import json
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from mcz.codecs import CODECS
 from mcz.codecs.contract import Codec
-from mcz.codecs.known_answer_table import KnownAnswer
-from mcz.codecs.known_answers import N_FRAMES, answer_layout, digest
+from mcz.codecs.known_answers import N_FRAMES, TABLE, KnownAnswer, answer_layout, digest
 from mcz.files.writing.signal_source import MemorySource
 from mcz.model.motion import Motion, Signal
 
-HOME = Path(__file__).parent.parent / "mcz/codecs/known_answer_table.py"
 OPTIONS = {"segment_frames": N_FRAMES, "group": N_FRAMES}  # where a codec has them
-WIDTH = 96
 
 
 def motion_of(codec: Codec) -> Motion:
@@ -45,43 +40,17 @@ def answer_of(codec: Codec) -> KnownAnswer:
     (segment,) = encoded.segments
     models = (*encoded.models, *encoded.known)
     header, streams = encoded.header.hex(), tuple(stream.hex() for stream in segment.streams)
-    held = tuple((model.kind, model.data.hex()) for model in models)
+    coded = tuple((model.kind, model.data.hex()) for model in models)
     version = codec.version if encoded.version is None else encoded.version
-    answer = KnownAnswer(version, codec.grouping, header, streams, "", held)
+    answer = KnownAnswer(version, codec.grouping, header, streams, "", coded)
     return replace(answer, sha256=digest(codec, answer))
 
 
-def _hex(text: str, indent: int) -> str:
-    if len(text) <= WIDTH - indent - 3:
-        return f'"{text}"'
-    pad = " " * (indent + 4)
-    lines = "\n".join(f'{pad}"{line}"' for line in textwrap.wrap(text, WIDTH - indent - 8))
-    return f"(\n{lines}\n{' ' * indent})"
-
-
-def _lines(codec: Codec) -> Iterator[str]:
-    answer = answer_of(codec)
-    yield f'    "{codec.name}": KnownAnswer('
-    yield f'        {answer.version}, "{answer.grouping}",'
-    yield f"        {_hex(answer.header, 8)},"
-    yield "        ("
-    yield from (f"            {_hex(stream, 12)}," for stream in answer.streams)
-    yield "        ),"
-    yield f'        "{answer.sha256}",'
-    if answer.models:
-        yield "        ("
-        for kind, data in answer.models:
-            yield f"            ({kind}, {_hex(data, 12)}),"
-        yield "        ),"
-    yield "    ),"
-
-
 def table() -> str:
-    """The text of the module."""
-    head = HOME.read_text("utf-8").partition("ANSWERS = {\n")
-    lines = [line for codec in CODECS.values() for line in _lines(codec)]
-    return "".join([head[0], head[1], *(f"{line}\n" for line in lines), "}\n"])
+    """The text of the file."""
+    answers = {codec.name: asdict(answer_of(codec)) for codec in CODECS.values()}
+    return json.dumps(answers, indent=1) + "\n"
 
 
 if __name__ == "__main__":
-    HOME.write_text(table(), "utf-8")
+    TABLE.write_text(table(), "utf-8")

@@ -41,7 +41,7 @@ MODULES = (
     "mcz.codecs.curves.qbc",
     "mcz.codecs.pca.pca",
     "mcz.codecs.space",
-    "mcz.codecs.spatial.prefix_streams",
+    "mcz.codecs.coding.prefix_codes",
     "mcz.codecs.spatial.windows",
     "mcz.codecs.spatial.lsdt_frame",
     "mcz.codecs.online.coder",

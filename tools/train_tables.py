@@ -19,17 +19,17 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz.codecs.coding import residuals, space_kernels
+from mcz.codecs import space
+from mcz.codecs.coding import residuals
 from mcz.codecs.contract import Codec
 from mcz.codecs.curves import kernels as qbc_kernels
 from mcz.codecs.curves import qbc
 from mcz.codecs.curves import streams as qbc_streams
 from mcz.codecs.online import coder as online_coder
 from mcz.codecs.online import online
-from mcz.codecs.pca import kernels as pca_kernels
 from mcz.codecs.pca import pca
 from mcz.codecs.pca import streams as pca_streams
-from mcz.codecs.spatial import lsdt_clip, lsdt_frame, windows
+from mcz.codecs.spatial import lsdt_frame, window_codecs, windows
 from mcz.codecs.wavelet import mrdwt
 from mcz.codecs.wavelet import streams as wavelet_streams
 from mcz.files.writing.planning import prepare
@@ -86,7 +86,7 @@ PLANS = {
     "pca": Plan(
         pca_streams,
         pca.CODEC,
-        (pca_kernels.N_SETS * residuals.N_MIXERS,),
+        (pca_streams.N_SETS * residuals.N_MIXERS,),
         24,
         (
             {"q": 30},
@@ -101,8 +101,8 @@ PLANS = {
     ),
     "window": Plan(
         windows,
-        lsdt_clip.CODEC,
-        (space_kernels.N_SETS * residuals.N_MIXERS,),
+        window_codecs.LSDT_CLIP,
+        (space.N_SETS * residuals.N_MIXERS,),
         60,  # of the few bits of a window
         (
             {"step": 0.02},
@@ -117,7 +117,7 @@ PLANS = {
     "frame": Plan(
         lsdt_frame,
         lsdt_frame.CODEC,
-        (space_kernels.N_SETS * residuals.N_MIXERS,),
+        (space.N_SETS * residuals.N_MIXERS,),
         24,
         (
             {"step": 0.02},

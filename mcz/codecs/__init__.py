@@ -20,11 +20,12 @@ from mcz.model.text_format import among
 
 
 class CodecEntry(NamedTuple):
-    """Ids of a codec, and its module."""
+    """Ids of a codec, its module, and the name that it has there."""
 
     id: int
     preset: int
     module: str
+    constant: str = "CODEC"
 
 
 # Modules are imported on first use: importing all takes longer than most commands run.
@@ -39,9 +40,9 @@ ENTRIES = {
     "qbc": CodecEntry(17, 0, "curves.qbc"),
     "pca": CodecEntry(18, 0, "pca.pca"),
     "lsdt-frame": CodecEntry(19, 0, "spatial.lsdt_frame"),
-    "lsdt-clip": CodecEntry(20, 1, "spatial.lsdt_clip"),
-    "mdtt": CodecEntry(20, 2, "spatial.mdtt"),
-    "pca-rdo": CodecEntry(20, 3, "spatial.pca_rdo"),
+    "lsdt-clip": CodecEntry(20, 1, "spatial.window_codecs", "LSDT_CLIP"),
+    "mdtt": CodecEntry(20, 2, "spatial.window_codecs", "MDTT"),
+    "pca-rdo": CodecEntry(20, 3, "spatial.window_codecs", "PCA_RDO"),
     "online": CodecEntry(21, 0, "online.online"),
 }
 SHARED = {16: "wavelet"}  # ids whose bitstream has the name of no codec
@@ -57,7 +58,9 @@ class Codecs(MutableMapping[str, Codec]):
 
     def __getitem__(self, name: str) -> Codec:
         if name not in self._loaded:
-            codec: Codec = import_module(f"{__name__}.{self._homes[name].module}").CODEC
+            home = self._homes[name]
+            module = import_module(f"{__name__}.{home.module}")
+            codec: Codec = getattr(module, home.constant)
             self._loaded[name] = codec
         return self._loaded[name]
 

@@ -26,9 +26,9 @@ from mcz.codecs.basis_models import (
 )
 from mcz.codecs.channel_weights import RULES, weights_of
 from mcz.codecs.contract import Layout, Model, SignalSource, model_id
-from mcz.codecs.gaps import fill_gaps
 from mcz.codecs.parameters import Parameter, choice, code_of, in_range, integer, number, ratio_of
 from mcz.codecs.segments import skeleton_of
+from mcz.codecs.source_readers import fill_gaps
 from mcz.codecs.space import (
     APART,
     COSINES,
@@ -38,7 +38,7 @@ from mcz.codecs.space import (
     SpaceFields,
     columns_of,
 )
-from mcz.codecs.transforms.dct import dct_matrix
+from mcz.codecs.transforms.bases import dct_matrix, learn_basis
 from mcz.errors import AccessError, MotionError, OptionError, reason_of
 from mcz.kinematics.angles import Unwrapper
 from mcz.model.motion import POSITION_KINDS, Skeleton
@@ -272,8 +272,6 @@ class _SampleKey:
 
 @lru_cache(maxsize=4)
 def _learn_cached(_digest: bytes, key: _SampleKey, apart: bool) -> Model:
-    from mcz.codecs.transforms.lsdt import learn_basis
-
     bases: list[Basis | Floats] = []
     for columns in columns_of(key.steps.shape[1], apart=apart):
         points = key.steps[:, columns]

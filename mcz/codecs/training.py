@@ -12,9 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mcz.codecs.basis_models import build_bases
-from mcz.codecs.gaps import fill_gaps
-from mcz.codecs.transforms.dct import dct_matrix
-from mcz.codecs.transforms.lsdt import GROWTH, ITERATIONS, SPARSITY, Learned, learn_bases
+from mcz.codecs.source_readers import fill_gaps
+from mcz.codecs.transforms.bases import (
+    GROWTH,
+    ITERATIONS,
+    SPARSITY,
+    Learned,
+    dct_matrix,
+    learn_bases,
+)
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import point_names, positions
 from mcz.model.motion import Motion

@@ -153,7 +153,7 @@ def _digest(path: Path) -> str:
 
 @cache
 def _warn(text: str) -> None:
-    warnings.warn(text, RuntimeWarning, stacklevel=3)
+    warnings.warn(text, RuntimeWarning, stacklevel=4)
 
 
 def bit_length(value: int) -> int:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 UNITS: dict[str, tuple[str, ...]] = {
     "fast": (
-        "mcz.codecs.coding.fast.head_kernels",
-        "mcz.codecs.coding.fast.lane_kernels",
+        "mcz.codecs.coding.fast.decode_kernels",
         "mcz.codecs.coding.fast.parent_kernels",
         "mcz.codecs.coding.fast.plan_kernels",
         "mcz.codecs.coding.fast.residual_kernels",
         "mcz.codecs.coding.fast.survey_kernels",
-        "mcz.codecs.coding.fast.tail_kernels",
         "mcz.codecs.coding.fast.write_kernels",
     ),
     "best": (
@@ -19,7 +17,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.coding.residuals",
     ),
     "numbers": (
-        "mcz.codecs.coding.forms.product_kernels",
+        "mcz.codecs.coding.forms.products",
         "mcz.model.numbers.kernels",
         "mcz.model.numbers.print_kernels",
         "mcz.model.numbers.scan_kernels",
@@ -29,17 +27,18 @@ UNITS: dict[str, tuple[str, ...]] = {
     ),
     "curves": (
         "mcz.codecs.curves.kernels",
-        "mcz.codecs.pca.kernels",
+        "mcz.codecs.pca.streams",
     ),
     "online": ("mcz.codecs.online.kernels",),
     "spatial": (
-        "mcz.codecs.spatial.prefix_kernels",
+        "mcz.codecs.coding.prefix_codes",
         "mcz.codecs.spatial.kernels",
-        "mcz.codecs.transforms.lsdt_kernels",
+        "mcz.codecs.transforms.bases",
     ),
     "wavelets": (
-        "mcz.codecs.transforms.wavelet_kernels",
-        "mcz.codecs.wavelet.kernels",
+        "mcz.codecs.transforms.lifting",
+        "mcz.codecs.transforms.wavelets",
+        "mcz.codecs.wavelet.streams",
     ),
     "metric": (
         "mcz.codecs.posewave.contact_kernels",
@@ -54,7 +53,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     ),
     "deflate": ("mcz.sources.arrays.deflate_kernels",),
     "motion": (
-        "mcz.codecs.transforms.post_filter_kernels",
+        "mcz.codecs.transforms.post_filter",
         "mcz.container.recovery.kernels",
         "mcz.exchange.conversion.scenes.key_kernels",
         "mcz.kinematics.frame_kernels",

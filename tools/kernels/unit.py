@@ -15,7 +15,7 @@ from tools.kernels.source import ROOT, Source, mangle_name, source, sources_behi
 HEAD = """# Written by tools/kernels from the sources that SOURCES names.
 from operator import index
 from numpy import dtype, empty, zeros
-from mcz.kernels.arrays import fit, items, restore
+from mcz.kernels.types import fit, items, restore
 
 cdef extern from "arithmetic.h" nogil:
     long long mcz_divide(long long a, long long b)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.logistic import rate_table, squash_table, stretch_table
+from mcz.codecs.coding.mixing import rate_table, squash_table, stretch_table
 from mcz.errors import FormatError
 from mcz.model.extras import annex_bytes
 from mcz.model.types import Ints, Params

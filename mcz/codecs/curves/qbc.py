@@ -49,7 +49,6 @@ from mcz.codecs.curves.streams import (
     parse_marks,
     straight_curves,
 )
-from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import (
     MAX_DECIMALS,
     SCALED,
@@ -67,7 +66,7 @@ from mcz.codecs.segments import (
     Lengths,
     segments_by_halving,
 )
-from mcz.codecs.subset_source import SubsetSource
+from mcz.codecs.source_readers import SegmentReader, SubsetSource
 from mcz.errors import FormatError, OptionError
 from mcz.model.schema import UVARINT, Checked, Record, bounded, build, field, parse
 from mcz.model.types import Floats, Ints, Params

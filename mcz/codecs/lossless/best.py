@@ -15,14 +15,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding import regression
-from mcz.codecs.coding.fast import (
-    head_kernels,
-    residual_kernels,
-    survey_kernels,
-    tail_kernels,
-    write_kernels,
-)
+from mcz.codecs.coding.fast import decode_kernels, residual_kernels, survey_kernels, write_kernels
 from mcz.codecs.coding.fast.decoder import (
     MOST_ROWS,
     SegmentDecoder,
@@ -34,7 +27,6 @@ from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
 from mcz.codecs.coding.fast.lanes import fault_of
 from mcz.codecs.coding.fast.residual_kernels import Predictors
 from mcz.codecs.coding.forms import WITH_UNIT
-from mcz.codecs.coding.regression import Regressions
 from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import (
     Codec,
@@ -48,7 +40,7 @@ from mcz.codecs.contract import (
     refuse_extras,
 )
 from mcz.codecs.lossless import best_kernels
-from mcz.codecs.lossless.best_kernels import Rests
+from mcz.codecs.lossless.best_kernels import Regressions, Rests
 from mcz.codecs.lossless.echoes import (
     Echo,
     build_echoes,
@@ -148,7 +140,7 @@ def _echoes_of(plan: Plan, leads: Words) -> list[Echo]:
     """Find echoes in the lanes whose ordinals equal their leads and tails."""
     numbers = plan.lanes.numbers
     is_whole = plan.channels.plans[numbers, survey_kernels.LIMIT] < 0
-    is_usable = is_whole & (plan.lanes.lattices[:, tail_kernels.REST] < 0)
+    is_usable = is_whole & (plan.lanes.lattices[:, residual_kernels.REST] < 0)
     columns = plan.channels.numbers[numbers]
     return find_echoes(plan.channels.ordinals[:, columns], leads, np.flatnonzero(is_usable))
 
@@ -165,13 +157,13 @@ def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[
     lanes = residual_kernels.predictors_of(n_lanes)
     lanes.first[:], lanes.scales[:] = coded.leads[:, 0], coded.scales
     taps = plan.channels.plans[
-        coded.numbers, head_kernels.TAPS : head_kernels.TAPS + head_kernels.N_TAPS
+        coded.numbers, decode_kernels.TAPS : decode_kernels.TAPS + decode_kernels.N_TAPS
     ]
     lanes.behind[:] = np.diff(taps, axis=1, prepend=0, append=0).T
     leads = np.zeros((residual_kernels.BEHIND + n_rows, n_lanes), np.int32)
     leads[residual_kernels.BEHIND :] = coded.leads.T
     rests = best_kernels.Rests(
-        np.zeros((n_rows, n_lanes), np.int32), coded.lattices[:, tail_kernels.REST].copy()
+        np.zeros((n_rows, n_lanes), np.int32), coded.lattices[:, residual_kernels.REST].copy()
     )
     has_rests = rests.scales >= 0
     rests.values[:, has_rests] = columns[coded.numbers[has_rests]].T
@@ -215,7 +207,7 @@ class _Model:
         sizes: list[int] = []
         for n in self.references[:, 0].tolist():
             sizes += best_kernels.n_linear(n), best_kernels.n_quadratic(n), best_kernels.N_BLENDED
-        result: Regressions = regression.regressions_of(sizes)
+        result: Regressions = best_kernels.regressions_of(sizes)
         return result
 
 
@@ -236,9 +228,9 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     (start, stop), (tail, end) = lanes.residuals[0] // 8, lanes.tails[0]
     bits = lanes.data[start:stop].tobytes()
     rests = best_kernels.Rests(
-        np.zeros((len(out), n_lanes), np.int32), lanes.lattices[:, tail_kernels.REST].copy()
+        np.zeros((len(out), n_lanes), np.int32), lanes.lattices[:, residual_kernels.REST].copy()
     )
-    lanes.lattices[:, tail_kernels.REST] = -1  # tails have none
+    lanes.lattices[:, residual_kernels.REST] = -1  # tails have none
     echoes: list[Echo] = []
     if stream[0] == ECHOED:
         echoes, at = read_echoes(bits, len(out), (rests.scales < 0).tolist())
@@ -249,7 +241,7 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     model.most_work = WORK * (len(stream) + SPARE)
     start = start_states("best")[0]  # BEST-06
     decode_stream(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
-    tails = tail_kernels.Tails(
+    tails = residual_kernels.Tails(
         lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns
     )
     leads = lanes.leads[residual_kernels.BEHIND :]
@@ -264,5 +256,5 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
 
 def _exact_echoes(table: Ints, decoder: SegmentDecoder) -> Ints:
     """The places of ``table`` whose ordinals echoes determine: in units an ordinal is its lead."""
-    forms = decoder.heads.plans[decoder.lanes.columns, head_kernels.FORM]
+    forms = decoder.heads.plans[decoder.lanes.columns, decode_kernels.FORM]
     return np.where(np.isin(forms, WITH_UNIT), 0, table)

@@ -13,12 +13,20 @@ from construct import Int8ul
 from numpy.typing import NDArray
 
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.space_kernels import Transform
 from mcz.codecs.coding.streams import start_states
 from mcz.codecs.contract import Layout
 from mcz.codecs.online import kernels
 from mcz.codecs.online.units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
-from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, Space, SpaceFields, space_of
+from mcz.codecs.space import (
+    APART,
+    COURSES,
+    MEAN,
+    N_COORDINATES,
+    Space,
+    SpaceFields,
+    Transform,
+    space_of,
+)
 from mcz.errors import FormatError, LostFrameError, MotionError
 from mcz.model.schema import Record, field, one_of, parse
 from mcz.model.types import Floats, Ints

@@ -14,16 +14,6 @@ import numpy as np
 from mcz.codecs.coding import mixing, residuals
 from mcz.codecs.coding.mixing import adaptive, number
 from mcz.codecs.coding.residuals import bits
-from mcz.codecs.coding.space_kernels import (
-    LAST,
-    MAX_INDEX,
-    TRACK_SIZE,
-    Transform,
-    add_frame,
-    code_frame,
-    coefficient_of,
-    index_of,
-)
 from mcz.codecs.online.rate_kernels import MOD as FIXED
 from mcz.codecs.online.rate_kernels import (
     MODE,
@@ -35,6 +25,16 @@ from mcz.codecs.online.rate_kernels import (
     str_step,
 )
 from mcz.codecs.online.units import GOLOMB, INTRA, LTR, STR
+from mcz.codecs.space import (
+    LAST,
+    MAX_INDEX,
+    TRACK_SIZE,
+    Transform,
+    add_frame,
+    code_frame,
+    coefficient_of,
+    index_of,
+)
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, IntColumn, Ints, Ints2
 

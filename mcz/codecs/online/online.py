@@ -27,7 +27,6 @@ from mcz.codecs.contract import (
     Span,
     model_finder,
 )
-from mcz.codecs.gaps import FrameReader, LiveRows
 from mcz.codecs.online.coder import (
     GOLOMB,
     INTRA,
@@ -52,6 +51,7 @@ from mcz.codecs.online.rate_control import (
 from mcz.codecs.online.units import Unit, build_units, parse_units
 from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import TARGET_BYTES
+from mcz.codecs.source_readers import FrameReader, LiveRows
 from mcz.codecs.space import SpaceFields, check, uses_of
 from mcz.codecs.space_choices import sample_of
 from mcz.errors import FormatError, OptionError

@@ -20,7 +20,6 @@ import numpy as np
 from construct import Int8ul
 
 from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
-from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import (
     MAX_DECIMALS,
     SCALED,
@@ -33,8 +32,14 @@ from mcz.codecs.parameters import (
     preset_values,
     ratio_of,
 )
-from mcz.codecs.pca import kernels
-from mcz.codecs.pca.streams import MAX_INDEX, MAX_SHIFT, Components, build_stream, parse_stream
+from mcz.codecs.pca.streams import (
+    MAX_INDEX,
+    MAX_SHIFT,
+    Components,
+    build_stream,
+    evaluate,
+    parse_stream,
+)
 from mcz.codecs.segments import (
     SEGMENT_FRAMES,
     SEGMENT_FRAMES_PARAMETER,
@@ -42,6 +47,7 @@ from mcz.codecs.segments import (
     segment_frames_of,
     segments_by_halving,
 )
+from mcz.codecs.source_readers import SegmentReader
 from mcz.errors import FormatError, MotionError
 from mcz.model.schema import Checked, Record, build, field, parse
 from mcz.model.types import Floats, Ints, Params, Reals, Settings, Values
@@ -137,7 +143,7 @@ def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, n_frames:
         means, rows = parts.means / 10.0**decimals, parts.coefficients / 10.0**decimals  # PCA-16
     basis = np.ldexp(parts.basis.astype(np.float64), -parts.shifts[:, None])
     out = np.zeros((n_frames, layout.n_channels))
-    kernels.evaluate(out, _plain(means), _plain(basis), _plain(rows))
+    evaluate(out, _plain(means), _plain(basis), _plain(rows))
     return out
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcz.codecs.contract import SignalSource
-from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import code_of
 from mcz.codecs.posewave.contact_choice import choose_contacts, runs_of
 from mcz.codecs.posewave.contact_plan import ContactsFields
@@ -41,6 +40,7 @@ from mcz.codecs.posewave.orders import N_NOTES, Orders
 from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
+from mcz.codecs.source_readers import FrameReader
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics import reach

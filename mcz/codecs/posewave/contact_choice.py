@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from mcz.codecs.contract import SignalSource
-from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import in_range
 from mcz.codecs.posewave.contact_plan import (
     MAX_POINTS,
@@ -26,6 +25,7 @@ from mcz.codecs.posewave.contacts import Piece
 from mcz.codecs.posewave.header import NAME
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import skeleton_of
+from mcz.codecs.source_readers import FrameReader
 from mcz.errors import OptionError
 from mcz.kinematics.contacts import USUAL_RATE, FootTracks
 from mcz.kinematics.joint_groups import find_feet

@@ -16,7 +16,7 @@ from warnings import warn
 
 import numpy as np
 
-from mcz.codecs.coding.logistic import rate_table, squash_table, stretch_table
+from mcz.codecs.coding.mixing import rate_table, squash_table, stretch_table
 from mcz.codecs.posewave.contact_plan import START_UNITS, Contacts, HeldPoints
 from mcz.codecs.posewave.row_coder import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan

@@ -7,8 +7,7 @@ function serves encoder and decoder. Imported on first use only.
 from __future__ import annotations
 
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.logistic import LIMIT
-from mcz.codecs.coding.mixing import adaptive, code, mixed, number
+from mcz.codecs.coding.mixing import LIMIT, adaptive, code, mixed, number
 from mcz.codecs.coding.residuals import bits
 from mcz.codecs.posewave.model_state import (
     C_ESCAPE,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.logistic import rate_table, squash_table, stretch_table
+from mcz.codecs.coding.mixing import rate_table, squash_table, stretch_table
 from mcz.codecs.posewave.model_state import (
     BLOCK,
     LANES,

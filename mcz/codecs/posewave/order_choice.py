@@ -11,7 +11,6 @@ from collections.abc import Container, Iterator
 import numpy as np
 
 from mcz.codecs.contract import SignalSource
-from mcz.codecs.gaps import FrameReader
 from mcz.codecs.posewave.header import NAME
 from mcz.codecs.posewave.orders import (
     N_ORDERS,
@@ -21,6 +20,7 @@ from mcz.codecs.posewave.orders import (
     own_sequence,
 )
 from mcz.codecs.segments import skeleton_of
+from mcz.codecs.source_readers import FrameReader
 from mcz.model.types import Floats
 
 SOURCE_ORDER = 0  # code of the order of the source

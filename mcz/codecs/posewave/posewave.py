@@ -34,7 +34,6 @@ from mcz.codecs.contract import (
     SignalSource,
     Span,
 )
-from mcz.codecs.gaps import LiveRows, SegmentReader
 from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
 from mcz.codecs.posewave.choices import PRESETS, Choice, choose, guess_step, live_choice
 from mcz.codecs.posewave.contact_choice import parse_runs, run_words
@@ -57,6 +56,7 @@ from mcz.codecs.segments import (
     segments_by_halving,
     skeleton_of,
 )
+from mcz.codecs.source_readers import LiveRows, SegmentReader
 from mcz.errors import FormatError, LostFrameError, OptionError
 from mcz.kinematics.frames import FramePositions
 from mcz.model.motion import Skeleton

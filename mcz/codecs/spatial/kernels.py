@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_residual, side_of
-from mcz.codecs.coding.space_kernels import (
+from mcz.codecs.space import (
     FIRSTS,
     LENGTHS,
     MAX_INDEX,
@@ -20,7 +20,7 @@ from mcz.codecs.coding.space_kernels import (
     coefficient_of,
     index_of,
 )
-from mcz.codecs.coding.space_kernels import TRACK_SIZE as TRACK_SIZE
+from mcz.codecs.space import TRACK_SIZE as TRACK_SIZE
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 

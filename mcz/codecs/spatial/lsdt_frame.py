@@ -17,6 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import space_choices
+from mcz.codecs.coding.prefix_codes import (
+    NO_CODES,
+    CodeFields,
+    build_vectors,
+    codes_from,
+    fields_of,
+    parse_vectors,
+)
 from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import (
     Codec,
@@ -30,7 +38,6 @@ from mcz.codecs.contract import (
     Span,
     model_finder,
 )
-from mcz.codecs.gaps import FrameReader, LiveRows, SegmentReader
 from mcz.codecs.parameters import Dial, preset_parameter, preset_values
 from mcz.codecs.segments import (
     SEGMENT_FRAMES_PARAMETER,
@@ -38,16 +45,9 @@ from mcz.codecs.segments import (
     segment_frames_of,
     segments_by_halving,
 )
+from mcz.codecs.source_readers import FrameReader, LiveRows, SegmentReader
 from mcz.codecs.space import COURSES, MEAN, SpaceFields, check, space_of, uses_of
 from mcz.codecs.spatial import kernels
-from mcz.codecs.spatial.prefix_streams import (
-    NO_CODES,
-    CodeFields,
-    build_vectors,
-    codes_from,
-    fields_of,
-    parse_vectors,
-)
 from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
 from mcz.model.schema import Record, build, field, parse
 from mcz.model.types import Bools, Floats, Ints, Params, Settings

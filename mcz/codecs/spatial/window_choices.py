@@ -23,9 +23,9 @@ from mcz.codecs.basis_models import (
     round_vectors,
 )
 from mcz.codecs.contract import Model, SignalSource, model_id
-from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import Parameter, Presets, integer, number, preset_parameter, ratio_of
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
+from mcz.codecs.source_readers import FrameReader
 from mcz.codecs.space import (
     APART,
     COSINES,
@@ -38,7 +38,7 @@ from mcz.codecs.space import (
 )
 from mcz.codecs.space_choices import CODER, DOMAIN, STEP, VIRTUAL_MARKERS, Sample
 from mcz.codecs.spatial.windows import MAX_WINDOW, Plan
-from mcz.codecs.transforms.dct import dct_matrix
+from mcz.codecs.transforms.bases import dct_matrix
 from mcz.errors import MotionError
 from mcz.model.types import Floats, Ints, Params
 
@@ -319,8 +319,9 @@ def _cost(basis: Basis) -> Floats:
     return result
 
 
-def parameters_of(presets: Presets, window: int) -> tuple[Parameter, ...]:
-    """Parameters of a codec with these presets and a default window of ``window`` frames."""
+def parameters_of(presets: Presets) -> tuple[Parameter, ...]:
+    """Parameters of a codec with these presets."""
+    window = presets["default"]["window"]
     return (
         preset_parameter(presets),
         STEP,

@@ -11,6 +11,15 @@ from functools import partial
 
 import numpy as np
 
+from mcz.codecs.coding.prefix_codes import (
+    NO_CODES,
+    CodeFields,
+    Codes,
+    build_vectors,
+    codes_from,
+    fields_of,
+    parse_vectors,
+)
 from mcz.codecs.coding.streams import decode_stream, encode_stream, start_states
 from mcz.codecs.contract import (
     Codec,
@@ -24,22 +33,13 @@ from mcz.codecs.contract import (
     Span,
     model_finder,
 )
-from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import SEGMENT_FRAMES, TARGET_BYTES
+from mcz.codecs.source_readers import FrameReader
 from mcz.codecs.space import Space, SpaceFields, check, space_of, uses_of
 from mcz.codecs.spatial import kernels
 from mcz.codecs.spatial.kernels import synthesize, synthesize_courses
-from mcz.codecs.spatial.prefix_streams import (
-    NO_CODES,
-    CodeFields,
-    Codes,
-    build_vectors,
-    codes_from,
-    fields_of,
-    parse_vectors,
-)
-from mcz.codecs.transforms.dct import dct_matrix
+from mcz.codecs.transforms.bases import dct_matrix
 from mcz.errors import FormatError, MotionError
 from mcz.model.schema import (
     UVARINT,

@@ -3,7 +3,7 @@
 SPEC.md, "Wavelets", is normative and has the same numbers. A wavelet is its two synthesis filters;
 those of analysis follow from them (``Wavelet.analysis``). Filters are those of PyWavelets.
 ``analyze`` is the encoder's and may differ in the last bits from machine to machine; ``synthesize``
-is bit-exact.
+is bit-exact: binary64, one product and one sum at a time, in the order of its compiled loop.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from functools import cache
 
 import numpy as np
 
-from mcz.codecs.transforms import wavelet_kernels
 from mcz.errors import FormatError, OptionError
-from mcz.model.types import Floats
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2
 
 MAX_TAPS = 64
 MAX_TAP = 16.0  # the greatest size of one
@@ -253,6 +253,57 @@ def needed_ranges(start: int, stop: int, levels: int, n_taps: int) -> Ranges:
     return ranges
 
 
+@kernel
+def synthesize_level(
+    out: Floats2, approx: Floats2, detail: Floats2, first: int, start: int, lo: Floats, hi: Floats
+) -> None:
+    """Write samples n >= start of the next finer approximation, (samples, channels).
+
+    ``out`` is all zeros. ``approx`` and ``detail`` hold the coefficients from number ``first`` on,
+    a column a channel; a ``detail`` without rows stands for zeros, which are not even added.
+    """
+    n_taps, n_channels = len(lo), approx.shape[1]
+    for n in range(start, start + len(out)):
+        for k in range(n // 2, (n + n_taps - 2) // 2 + 1):  # WAVE-02
+            tap = lo[n + n_taps - 2 - 2 * k]  # WAVE-02
+            for c in range(n_channels):
+                # CODEC-02, WAVE-02
+                out[n - start, c] = out[n - start, c] + tap * approx[k - first, c]
+        if len(detail) == 0:  # WAVE-02
+            continue
+        for k in range(n // 2, (n + n_taps - 2) // 2 + 1):
+            tap = hi[n + n_taps - 2 - 2 * k]  # WAVE-02
+            for c in range(n_channels):
+                out[n - start, c] = out[n - start, c] + tap * detail[k - first, c]  # WAVE-02
+
+
+@kernel
+def analyze_level(
+    approx: Floats2,
+    detail: Floats2,
+    signal: Floats2,
+    first: int,
+    n_samples: int,
+    start: int,
+    low: Floats,
+    high: Floats,
+) -> None:
+    """Write approximations and details k >= start, (coefficients, channels), of ``n_samples``.
+
+    Both are all zeros before. ``signal`` holds its samples from number ``first`` on, a column a
+    channel; beyond both ends of the whole signal it is mirrored about half a sample (PyWavelets'
+    mode "symmetric").
+    """
+    n_taps, n_channels = len(low), signal.shape[1]
+    for k in range(start, start + len(approx)):
+        for tap in range(n_taps):
+            n = (2 * k + 1 - tap) % (2 * n_samples)
+            n = min(n, 2 * n_samples - 1 - n)
+            for c in range(n_channels):
+                approx[k - start, c] += low[tap] * signal[n - first, c]
+                detail[k - start, c] += high[tap] * signal[n - first, c]
+
+
 def analyze(
     window: Floats, at: int, first: int, stop: int, lengths: Sequence[int], wavelet: Wavelet
 ) -> list[Floats]:
@@ -273,7 +324,7 @@ def analyze(
         begin = 0 if have == 0 else (have + wavelet.n_taps - 1) // 2
         own = slice(start - begin, end - begin)
         approx, detail = np.zeros((2, last - begin, signal.shape[1]))
-        wavelet_kernels.analyze(approx, detail, signal, have, lengths[level - 1], begin, low, high)
+        analyze_level(approx, detail, signal, have, lengths[level - 1], begin, low, high)
         details.append(detail[own])
         have, signal = begin, approx
     return [signal[own], *reversed(details)]
@@ -296,6 +347,6 @@ def synthesize(
         detail = bands[levels + 1 - level]
         begin, end = ranges[level - 1]
         finer = np.zeros((end - begin, signal.shape[1]))
-        wavelet_kernels.synthesize(finer, signal, detail, firsts[level - 1], begin, lo, hi)
+        synthesize_level(finer, signal, detail, firsts[level - 1], begin, lo, hi)
         signal = finer
     return np.array(signal, order="C")

@@ -32,9 +32,9 @@ from mcz.codecs.parameters import (
     preset_values,
 )
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
-from mcz.codecs.wavelet import kernels, wavelet
+from mcz.codecs.wavelet import wavelet
 from mcz.codecs.wavelet.reencode import recoder
-from mcz.codecs.wavelet.streams import DEAD_ZONE, LEAST_UNIT, Quantizer
+from mcz.codecs.wavelet.streams import DEAD_ZONE, LEAST_UNIT, Quantizer, anneal
 from mcz.codecs.wavelet.wavelet import (
     BITSTREAM,
     WAVELET,
@@ -209,7 +209,7 @@ def choose(
     if iterations is None:
         iterations = min(max(FEWEST_MOVES, MOVES * n_channels), MOST_MOVES)
     starts = np.arange(n_channels) * (n_each + 1)
-    after = kernels.anneal(counts, worth, starts, tails.ravel(), iterations, seed)
+    after = anneal(counts, worth, starts, tails.ravel(), iterations, seed)
     kept = np.zeros((n_channels, n_each), np.bool_)
     np.put_along_axis(kept, order, np.arange(n_each) < counts[:, None], axis=1)
     shown = np.where(kept, sizes, np.inf)

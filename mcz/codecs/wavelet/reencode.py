@@ -9,7 +9,7 @@ import numpy as np
 
 from mcz.codecs.contract import Recode, RecodeRequest, SignalSource
 from mcz.codecs.parameters import code_of
-from mcz.codecs.subset_source import SubsetSource
+from mcz.codecs.source_readers import SubsetSource
 from mcz.codecs.transforms.wavelets import INLINE, Wavelet, by_id
 from mcz.codecs.wavelet.streams import DEAD_ZONE, Quantizer
 from mcz.codecs.wavelet.wavelet import NAME, Frames, Plan, Transform, WaveletHeader, segment_streams

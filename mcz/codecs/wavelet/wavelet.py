@@ -15,7 +15,6 @@ import numpy as np
 from construct import Float64l, If, Int8ul, this
 
 from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
-from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import (
     MAX_DECIMALS,
     SCALED,
@@ -25,6 +24,7 @@ from mcz.codecs.parameters import (
     ratio_of,
 )
 from mcz.codecs.segments import SEGMENT_FRAMES, Lengths, segments_by_halving
+from mcz.codecs.source_readers import FrameReader
 from mcz.codecs.transforms import wavelets
 from mcz.codecs.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
 from mcz.codecs.wavelet.streams import Coding, Quantizer, build_streams, parse_streams

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from mcz.bench.cases import Case, load
 from mcz.bench.tables import Table
 from mcz.codecs.training import frames_of, training_set
-from mcz.codecs.transforms.dct import dct_matrix
-from mcz.codecs.transforms.lsdt import GROWTH, ITERATIONS, haar_basis, learn_bases
+from mcz.codecs.transforms.bases import GROWTH, ITERATIONS, dct_matrix, haar_basis, learn_bases
 from mcz.errors import MotionError
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,7 @@ from mcz.codecs import raw
 from mcz.codecs.coding import mixing
 from mcz.codecs.coding.streams import start_states
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
-from mcz.codecs.curves import qbc, streams
+from mcz.codecs.curves import kernels, qbc, streams
 from mcz.codecs.parameters import SCALED
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.schema import varint
@@ -149,11 +149,10 @@ def curves_of(plan: Plan, path: Path, first: int, stop: int) -> tuple[Ints, Ints
 
 def coded_marks(marks: Ints, halves: int, *, faulty: bool = False) -> bytes:
     """A stream of marks; ``faulty``: its last point has no code."""
-    loops = streams._kernels()
     scale = streams.scale_of(min(halves, streams.MAX_SCALE))
     return bytes((halves,)) + _bits(
         streams.MARKS,
-        lambda state, data: loops.code_marks(state, data, marks.copy(), len(marks), scale) < 0,
+        lambda state, data: kernels.code_marks(state, data, marks.copy(), len(marks), scale) < 0,
         faulty=faulty,
     )
 
@@ -167,12 +166,11 @@ def coded_curves(
     faulty: bool = False,
 ) -> bytes:
     """A stream of curves; ``faulty``: its last point or length has no code."""
-    loops = streams._kernels()
     scales = np.array([streams.scale_of(min(h, streams.MAX_SCALE)) for h in halves])
 
     def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
         parts = (part.copy() for part in (curves.lengths, curves.ends, curves.mids))
-        found: int = loops.code_details(state, data, marks, frames, *parts, scales)
+        found: int = kernels.code_details(state, data, marks, frames, *parts, scales)
         return found == len(curves.lengths)
 
     return bytes(halves) + _bits(streams.DETAILS, loop, faulty=faulty)

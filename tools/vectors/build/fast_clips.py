@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.fast.head_kernels import TAP_UNIT, scale_of
+from mcz.codecs.coding.fast.decode_kernels import TAP_UNIT, scale_of
 from mcz.codecs.coding.forms import form_of_grid
 from mcz.codecs.coding.forms.counts import Law
 from mcz.model.numbers import Grid
@@ -141,7 +141,7 @@ def _head_of(head: Head, grid: Grid, column: Ints) -> bytes | _Lane:
 
 
 def _lane(coded: Coded, grid: Grid, numbers: list[int]) -> _Lane:
-    from mcz.codecs.coding.fast import tail_kernels as tail
+    from mcz.codecs.coding.fast import residual_kernels as tail
 
     form = form_of_grid(grid) if coded.form is None else coded.form
     base, digits, top = 0, 0, 0
@@ -176,7 +176,7 @@ def _predict_columns(
     lanes: Sequence[_Lane], places: Sequence[tuple[int, int]], columns: Ints
 ) -> CodedLanes:
     """The lanes as they are written, whose ``columns`` become tails; heads have all fields then."""
-    from mcz.codecs.coding.fast import tail_kernels as tail
+    from mcz.codecs.coding.fast import residual_kernels as tail
     from mcz.codecs.coding.fast import write_kernels as write
 
     lattices = np.array([lane.lattice for lane in lanes], np.int64)

@@ -18,7 +18,7 @@ from mcz.codecs.coding import mixing
 from mcz.codecs.coding.residuals import code_table
 from mcz.codecs.coding.streams import scale_of, start_states
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
-from mcz.codecs.pca import kernels, pca
+from mcz.codecs.pca import pca, streams
 from mcz.model.schema import varint
 
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
@@ -71,7 +71,7 @@ def stream_of(part: Part, decimals: int) -> bytes:
     faults = (
         code_table(state, data, means[None], np.array([scale_of(part.mean_scale)]), 0),
         code_table(state, data, basis, firsts, 1),
-        kernels.code_coefficients(state, data, rows, forms >> 6, scales) >= 0,
+        streams.code_coefficients(state, data, rows, forms >> 6, scales) >= 0,
     )
     assert any(faults) == part.faulty
     return head + data[: mixing.finish(state, data)].tobytes()

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs import codec_by_name, raw
 from mcz.codecs.basis_models import Basis, build_model, known_models
+from mcz.codecs.coding.prefix_codes import codes_from, fields_of
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -29,7 +30,6 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
 from mcz.codecs.spatial import lsdt_frame, windows
-from mcz.codecs.spatial.prefix_streams import codes_from, fields_of
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.schema import parse, varint

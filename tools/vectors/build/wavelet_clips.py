@@ -175,12 +175,11 @@ def approximation(plan: Plan, band: Band, head: Head, *, faulty: bool = False) -
     data += varint(2 * band[0] if band[0] >= 0 else -2 * band[0] - 1)
     if head.halves == streams.CONSTANT:
         return data
-    loops = streams._kernels()
     scale = streams.scale_of(head.halves)
 
     def loop(state: Ints, out: NDArray[np.uint8]) -> int:
         values = np.array(band, np.int64)
-        fault = loops.code_approximations(state, out, values, len(band), head.predictor, scale)
+        fault = streams.code_approximations(state, out, values, len(band), head.predictor, scale)
         return int(fault)
 
     return data + _bits(0, loop, faulty=faulty)
@@ -188,7 +187,6 @@ def approximation(plan: Plan, band: Band, head: Head, *, faulty: bool = False) -
 
 def detail(plan: Plan, bands: Sequence[Band], place: int, *, faulty: bool = False) -> bytes:
     """The stream of the detail ``bands[place]`` beside the band before it."""
-    loops = streams._kernels()
     coarser = np.array(bands[place - 1], np.int64)
     if place == 1:
         beside = streams._activity(coarser, len(coarser))
@@ -198,7 +196,7 @@ def detail(plan: Plan, bands: Sequence[Band], place: int, *, faulty: bool = Fals
 
     def loop(state: Ints, out: NDArray[np.uint8]) -> int:
         values = np.array(bands[place], np.int64)
-        fault = loops.code_details(state, out, values, len(values), beside, shift, plan.least)
+        fault = streams.code_details(state, out, values, len(values), beside, shift, plan.least)
         return int(fault)
 
     return _bits(min(place, streams.N_SETS - 1), loop, faulty=faulty)

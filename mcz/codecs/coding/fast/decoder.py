@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcz.codecs.coding.fast import head_kernels, lane_kernels, residual_kernels, tail_kernels
+from mcz.codecs.coding.fast import decode_kernels, residual_kernels
 from mcz.codecs.coding.fast.lanes import Lanes, read_all
 from mcz.codecs.coding.forms import WITH_UNIT, form_of_grid
 from mcz.codecs.coding.forms.units import parse_mapping
@@ -102,7 +102,7 @@ class Heads:
 
     def absent(self, kind: int) -> list[int]:
         """The groups that are not here and that copies or, of coded channels, parents are of."""
-        named = self.plans[self.plans[:, head_kernels.KIND] == kind, head_kernels.GROUP]
+        named = self.plans[self.plans[:, decode_kernels.KIND] == kind, decode_kernels.GROUP]
         return sorted(set(named[named >= 0].tolist()).difference(self.groups))
 
     def fault(self, channel: int, fault: int) -> FormatError:
@@ -125,12 +125,12 @@ def read_heads(shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int)
     streams = [fetch(group) for group in groups]
     bounds = np.cumsum([0, *map(len, streams)])
     data = b"".join((*streams, bytes(SPARE)))
-    plans = np.zeros((len(columns.channels), head_kernels.PLAN_SIZE), np.int64)
+    plans = np.zeros((len(columns.channels), decode_kernels.PLAN_SIZE), np.int64)
     parts = np.zeros((len(groups), 3), np.int64)
     parts[:, 2] = bounds[1:]
     heads = Heads(groups, columns, data, plans, parts)
     text = np.frombuffer(data, np.uint8)
-    channel, fault = head_kernels.read_heads(
+    channel, fault = decode_kernels.read_heads(
         text, bounds, columns.firsts, n_rows, columns.forms, plans, parts
     )
     if channel >= 0:
@@ -148,10 +148,10 @@ def read_heads_of(
     heads = read_heads(shape, groups, fetch, n_rows)
     if len(groups) == len(shape.groups):
         return heads, len(groups)
-    if absent := heads.absent(head_kernels.COPY):
+    if absent := heads.absent(decode_kernels.COPY):
         heads = read_heads(shape, (*groups, *absent), fetch, n_rows)
     n_whole = len(heads.groups)
-    if absent := heads.absent(head_kernels.CODED):
+    if absent := heads.absent(decode_kernels.CODED):
         heads = read_heads(shape, (*heads.groups, *absent), fetch, n_rows)
     return heads, n_whole
 
@@ -165,7 +165,7 @@ class SegmentDecoder:
         """``out``: (rows, channels of ``groups``), of ``n_rows`` the first. Raises FormatError."""
         heads, n_whole = read_heads_of(shape, groups, fetch, n_rows)
         columns = heads.columns
-        channel, fault = lane_kernels.link(
+        channel, fault = decode_kernels.link(
             heads.plans, columns.firsts, columns.groups, columns.places, len(groups), n_whole
         )
         if channel >= 0:
@@ -180,7 +180,7 @@ class SegmentDecoder:
         """Fill ``out``, after the lanes were decoded."""
         self._map_units()
         n_wanted = self.out.shape[1]
-        lane_kernels.fill_columns(self.lanes.data, self.heads.plans, n_wanted, self.rows)
+        decode_kernels.fill_columns(self.lanes.data, self.heads.plans, n_wanted, self.rows)
         if self.rows is not self.out:
             self.out[:] = self.rows[:, :n_wanted]
 
@@ -188,11 +188,11 @@ class SegmentDecoder:
         plans = self.heads.plans
         n_whole = len(self.lanes.tails)
         columns = self.lanes.columns[: self.lanes.starts[n_whole]]
-        forms = plans[columns, head_kernels.FORM]
+        forms = plans[columns, decode_kernels.FORM]
         for number in np.flatnonzero((forms >= WITH_UNIT[0]) & (forms <= WITH_UNIT[-1])).tolist():
             plan, column = plans[columns[number]], self.rows[:, columns[number]]
             grid = self.shape.grids[self.heads.columns.channels[columns[number]]]
-            at, form = int(plan[head_kernels.FIELDS]), int(plan[head_kernels.FORM])
+            at, form = int(plan[decode_kernels.FIELDS]), int(plan[decode_kernels.FORM])
             mapping, has_rests, _ = parse_mapping(self.heads.data, at, form, grid)
             assert mapping is not None
             leads = self.lanes.leads[residual_kernels.BEHIND :, number].astype(np.int64)
@@ -201,11 +201,11 @@ class SegmentDecoder:
 
 
 def _lanes_of(heads: Heads, n_whole: int, out: Ints, is_whole: bool) -> Lanes:
-    n_lanes = int(np.sum(heads.plans[:, head_kernels.KIND] == head_kernels.CODED))
+    n_lanes = int(np.sum(heads.plans[:, decode_kernels.KIND] == decode_kernels.CODED))
     starts, columns = np.empty(len(heads.groups) + 1, np.int64), np.empty(n_lanes, np.int64)
-    lattices = np.zeros((n_lanes, tail_kernels.LATTICE_SIZE), np.int64)
+    lattices = np.zeros((n_lanes, residual_kernels.LATTICE_SIZE), np.int64)
     predictors = residual_kernels.predictors_of(n_lanes)
-    lane_kernels.fill_lanes(
+    decode_kernels.fill_lanes(
         heads.plans, heads.columns.firsts, starts, predictors, lattices, columns
     )
     leads = np.empty((residual_kernels.BEHIND + len(out), n_lanes), np.int32)

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.coding.fast import (
-    head_kernels,
+    decode_kernels,
     parent_kernels,
     plan_kernels,
+    residual_kernels,
     survey_kernels,
-    tail_kernels,
     write_kernels,
 )
 from mcz.codecs.coding.fast.survey_kernels import Channels, CodedLanes
@@ -131,16 +131,22 @@ class StreamBuilder:
             if rest is not None:
                 rests[n] = rest
                 quarters = plan_kernels.byte_of(16 * float(np.abs(rest).mean()))
-                rest_scale, own = head_kernels.scale_of(quarters), own + bytes((quarters,))
-            plans[n, [head_kernels.FORM, head_kernels.REST, survey_kernels.LIMIT]] = (
+                rest_scale, own = decode_kernels.scale_of(quarters), own + bytes((quarters,))
+            plans[n, [decode_kernels.FORM, decode_kernels.REST, survey_kernels.LIMIT]] = (
                 units.form,
                 rest_scale,
                 -1,
             )
             plans[
-                n, [head_kernels.BASE, head_kernels.DIGITS, head_kernels.DROP, head_kernels.TOP]
+                n,
+                [
+                    decode_kernels.BASE,
+                    decode_kernels.DIGITS,
+                    decode_kernels.DROP,
+                    decode_kernels.TOP,
+                ],
             ] = 0
-            plans[n, [head_kernels.FIELDS, survey_kernels.FIELDS_END]] = (
+            plans[n, [decode_kernels.FIELDS, survey_kernels.FIELDS_END]] = (
                 len(fields),
                 len(fields) + len(own),
             )
@@ -148,7 +154,7 @@ class StreamBuilder:
         return rests, fields
 
     def _find_candidates(self, channels: Channels) -> Bools:
-        is_coded = channels.plans[:, head_kernels.KIND] == head_kernels.CODED
+        is_coded = channels.plans[:, decode_kernels.KIND] == decode_kernels.CODED
         is_small = channels.plans[:, survey_kernels.MOST] < self.unit_limits
         candidates: Bools = is_coded & is_small
         others = np.flatnonzero(is_coded & ~is_small & self.may_be_counts)
@@ -159,11 +165,11 @@ class StreamBuilder:
     def _find_leads(self, channels: Channels) -> CodedLanes:
         """The coded channels, split into leads and tails, which replace their columns."""
         plans = channels.plans
-        numbers = np.flatnonzero(plans[:, head_kernels.KIND] == head_kernels.CODED)
+        numbers = np.flatnonzero(plans[:, decode_kernels.KIND] == decode_kernels.CODED)
         starts = np.searchsorted(numbers, self.firsts)
-        lattices = np.zeros((len(numbers), tail_kernels.LATTICE_SIZE), np.int64)
-        lattices[:, : head_kernels.SCALE - head_kernels.BASE] = plans[
-            numbers, head_kernels.BASE : head_kernels.SCALE
+        lattices = np.zeros((len(numbers), residual_kernels.LATTICE_SIZE), np.int64)
+        lattices[:, : decode_kernels.SCALE - decode_kernels.BASE] = plans[
+            numbers, decode_kernels.BASE : decode_kernels.SCALE
         ]
         leads, residuals = np.empty((2, len(numbers), len(channels.ordinals)), np.int32)
         costs, scales = np.zeros((2, len(numbers)), np.int64)
@@ -171,7 +177,7 @@ class StreamBuilder:
             numbers, starts, lattices, leads, residuals, costs, scales
         )
         write_kernels.find_leads(lanes, channels.columns)
-        plans[numbers, head_kernels.TINY] = lattices[:, head_kernels.TINY - head_kernels.BASE]
+        plans[numbers, decode_kernels.TINY] = lattices[:, decode_kernels.TINY - decode_kernels.BASE]
         return lanes
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.coding.fast import residual_kernels as residual
-from mcz.codecs.coding.fast import tail_kernels as tail
+from mcz.codecs.coding.fast import residual_kernels as tail
 from mcz.codecs.coding.fast.residual_kernels import Predictors
 from mcz.errors import FormatError
 from mcz.kernels import lacks_compiled_kernels

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.coding.fast.head_kernels import LINK, WEIGHT
+from mcz.codecs.coding.fast.decode_kernels import LINK, WEIGHT
 from mcz.codecs.coding.fast.plan_kernels import TRIED_ROWS, cost_of
 from mcz.codecs.coding.fast.survey_kernels import CodedLanes
 from mcz.kernels import kernel, wrapped

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.coding.fast import head_kernels as head
+from mcz.codecs.coding.fast import decode_kernels as head
 from mcz.codecs.coding.fast.residual_kernels import MOST_SIZE, PLAIN
 from mcz.codecs.coding.fast.survey_kernels import PREDICTOR, CodedLanes
 from mcz.kernels import bit_length, kernel, wrapped

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcz.codecs.coding.fast import head_kernels as head
-from mcz.codecs.coding.fast.head_kernels import PLAN_SIZE as READ_SIZE
-from mcz.codecs.coding.fast.tail_kernels import POWERS
+from mcz.codecs.coding.fast import decode_kernels as head
+from mcz.codecs.coding.fast.decode_kernels import PLAN_SIZE as READ_SIZE
+from mcz.codecs.coding.fast.residual_kernels import POWERS
 from mcz.kernels import bit_length, kernel, trailing_zeros
 from mcz.kernels.types import Ints, Ints2, Words2
 

@@ -5,19 +5,9 @@ SPEC.md, "Codec 1: fast", is normative. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.codecs.coding.fast import head_kernels as head
+from mcz.codecs.coding.fast import decode_kernels as head
 from mcz.codecs.coding.fast.plan_kernels import grown
-from mcz.codecs.coding.fast.residual_kernels import PLAIN
-from mcz.codecs.coding.fast.survey_kernels import (
-    CHANGES,
-    FIELDS_END,
-    LIMIT,
-    PREDICTOR,
-    Channels,
-    CodedLanes,
-    short_size,
-)
-from mcz.codecs.coding.fast.tail_kernels import (
+from mcz.codecs.coding.fast.residual_kernels import (
     BASE,
     DIGITS,
     DROP,
@@ -30,11 +20,21 @@ from mcz.codecs.coding.fast.tail_kernels import (
     LOW,
     NEAR,
     PER_CLASS,
+    PLAIN,
     POWERS,
     REST,
     TINY,
     TOP,
     settle,
+)
+from mcz.codecs.coding.fast.survey_kernels import (
+    CHANGES,
+    FIELDS_END,
+    LIMIT,
+    PREDICTOR,
+    Channels,
+    CodedLanes,
+    short_size,
 )
 from mcz.kernels import bit_length, kernel, put_eight_bytes, truncated, wrapped
 from mcz.kernels.types import Bytes, Bytes2, Ints, Ints2, Words

@@ -1,6 +1,7 @@
 """Channels of rounding noise: angles that were a few units in the last place, printed in degrees.
 
-``of_products`` is normative (SPEC.md, "Codec 1: fast", form 33); finding a unit is not.
+``of_products`` is normative (SPEC.md, "Codec 1: fast", form 33, and "Value to ordinal"); finding a
+unit is not. Loops over the codes and values of a column are compiled.
 """
 
 from __future__ import annotations
@@ -9,12 +10,102 @@ from functools import cache
 
 import numpy as np
 
-from mcz.codecs.coding.forms import product_kernels
-from mcz.kernels import lacks_compiled_kernels
+from mcz.kernels import kernel, lacks_compiled_kernels, trailing_zeros, truncated
+from mcz.kernels.types import Floats, Ints
 from mcz.model.numbers import Grid, GridKind, values_of
 from mcz.model.numbers.magnitudes import POWERS
 from mcz.model.numbers.tokens import TENS
-from mcz.model.types import Floats, Ints
+from mcz.model.numbers.value_kernels import decimal, magnitude_of
+
+EXACT = 1 << 53  # up to which quotients of floats are right
+MOST = float(1 << 24)  # units in a value, for which one is looked for
+PRINTED = 1 << 62  # no ordinal: the decimal of such a product is to be printed
+
+
+@kernel
+def fill(
+    codes: Ints, unit: float, shifts: int, tens: Floats, powers: Floats, digits: int, out: Ints
+) -> int:
+    """Fill ``out`` with ordinals, ``PRINTED`` where one product is not exact enough: how many.
+
+    Of so many ``digits``; ``tens``: the exact powers of ten; ``powers``: all of them.
+    """
+    power = left = 0  # power: of ten, of the number before
+    for t in range(len(codes)):
+        if codes[t] == 0:
+            out[t] = 0
+            continue
+        before = abs(codes[t]) - 1
+        q = truncated(float(before) / float(shifts)) if before < EXACT else before // shifts
+        value = float(2 * q + 1) * float(1 << before - q * shifts) * unit
+        mantissa, power = decimal(value, power, digits, tens, powers)
+        if mantissa == 0:
+            out[t] = PRINTED
+            left += 1
+            continue
+        magnitude = magnitude_of(mantissa, power, digits, tens)
+        out[t] = -1 - magnitude if codes[t] < 0 else magnitude
+    return left
+
+
+@kernel
+def next_unit(
+    values: Floats,
+    ordinals: Ints,
+    units: Floats,
+    start: int,
+    tens: Floats,
+    powers: Floats,
+    digits: int,
+) -> tuple[int, int]:
+    """The first unit from ``start`` on of which all values are multiples, as their ordinals show.
+
+    Where there is none: how many units there are. Also how many of the products show nothing, as
+    they are to be printed.
+    """
+    for place in range(start, len(units)):
+        left = count_open(values, ordinals, units[place], tens, powers, digits)
+        if left >= 0:
+            return place, left
+    return len(units), 0
+
+
+def count_open(
+    values: Floats, ordinals: Ints, unit: float, tens: Floats, powers: Floats, digits: int
+) -> int:
+    """Count the multiples of a unit to be printed; -1 where another has another ordinal."""
+    power = left = 0
+    for row in range(len(values)):
+        size = np.rint(abs(values[row]) / unit)
+        magnitude = 0
+        if size >= MOST:
+            return -1
+        if size > 0.0:
+            mantissa, power = decimal(size * unit, power, digits, tens, powers)
+            if mantissa == 0:
+                left += 1
+                continue
+            magnitude = magnitude_of(mantissa, power, digits, tens)
+        if ordinals[row] != (-1 - magnitude if values[row] < 0.0 and size > 0.0 else magnitude):
+            return -1
+    return left
+
+
+@kernel
+def fill_codes(values: Floats, unit: float, codes: Ints) -> int:
+    """Fill in the codes of multiples below ``MOST``; returns ``shifts``, as few as there may be."""
+    shifts = 1
+    for row in range(len(values)):
+        codes[row] = truncated(np.rint(values[row] / unit))
+        if codes[row]:
+            shifts = max(shifts, trailing_zeros(codes[row]) + 1)
+    for row in range(len(values)):
+        if codes[row]:
+            z = trailing_zeros(codes[row])
+            code = (abs(codes[row]) >> (z + 1)) * shifts + z + 1
+            codes[row] = -code if codes[row] < 0 else code
+    return shifts
+
 
 DEGREE = 180 / np.pi  # in a radian
 LARGEST = 1e-12  # degrees: numbers near 1e-9 are products by chance
@@ -28,10 +119,10 @@ def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
     A code has a sign, and its size less 1 is q * shifts + z: it stands for (2q + 1) * 2^z units.
     """
     codes = np.ascontiguousarray(codes)
-    out = np.full(len(codes), product_kernels.PRINTED)
+    out = np.full(len(codes), PRINTED)
     all_printed = lacks_compiled_kernels() and bool((np.abs(codes) < EXACT_CODES).all())
-    if all_printed or product_kernels.fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
-        printed = out == product_kernels.PRINTED
+    if all_printed or fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
+        printed = out == PRINTED
         few, places = np.unique(codes[printed], return_inverse=True)  # often small ones
         out[printed] = grid.ordinals(multiples_of(few, shifts) * np.float64(unit))[0][
             places.ravel()
@@ -68,12 +159,10 @@ def find_products(ordinals: Ints, grid: Grid) -> tuple[float, int, Ints] | None:
     place = -1
     while True:
         start = place + 1
-        place, n_open = product_kernels.next_unit(
-            values, ordinals, _UNITS, start, TENS, POWERS, grid.digits
-        )
+        place, n_open = next_unit(values, ordinals, _UNITS, start, TENS, POWERS, grid.digits)
         if place == len(_UNITS):
             return None
         unit = float(_UNITS[place])
-        shifts = product_kernels.fill_codes(values, unit, codes)
+        shifts = fill_codes(values, unit, codes)
         if not n_open or (of_products(codes, unit, shifts, grid) == ordinals).all():
             return unit, shifts, codes

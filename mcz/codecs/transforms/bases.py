@@ -1,8 +1,12 @@
-"""Learned spatial decorrelation: orthogonal bases that make the frames of a motion sparse.
+"""Bases of frames: the orthonormal discrete cosine transform, and bases learned from motions.
 
-Algorithm 1 of J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, "Low-latency compression of mocap
-data using learned spatial decorrelation transform", CAGD 2016. A basis B (J, J) holds its vectors
-as rows; the coefficients of a frame m (J,) are B m. What is sought is the B for which the squares
+SPEC.md, "Cosines", is normative for ``dct_matrix`` and has its steps in the same order, + - * /
+only: every machine computes the same numbers, within 1e-15 of the true ones.
+
+Learned spatial decorrelation is Algorithm 1 of J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He,
+"Low-latency compression of mocap data using learned spatial decorrelation transform", CAGD 2016:
+orthogonal bases that make the frames of a motion sparse. A basis B (J, J) holds its vectors as
+rows; the coefficients of a frame m (J,) are B m. The algorithm seeks the B for which the squares
 of all but the P largest coefficients of every frame sum to the least.
 
 The problem is not convex. Started as published, from DCT or Haar and with the final P, the
@@ -18,13 +22,108 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from mcz.codecs.transforms.dct import dct_matrix
-from mcz.codecs.transforms.lsdt_kernels import truncate
 from mcz.errors import OptionError
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats2
 from mcz.model.types import Floats
+
+HALF_PI = 1.5707963267948966
+NEWTON_STEPS = 40  # of a square root; half of them would do
+
+
+@lru_cache(maxsize=16)
+def dct_matrix(n: int) -> Floats:
+    """The DCT-II of ``n`` points, (n, n), read-only: row k is the k-th basis vector."""
+    if not n:
+        return np.zeros((0, 0))
+    cosine = _quarter(n)
+    root = _root(2.0 / n)
+    k, at = np.ogrid[:n, :n]
+    turn = (2 * at + 1) * k % (4 * n)  # a full turn is 4 n
+    turn = np.where(turn > 2 * n, 4 * n - turn, turn)
+    matrix: Floats = np.where(
+        turn > n, -cosine[np.minimum(2 * n - turn, n)], cosine[np.minimum(turn, n)]
+    )
+    matrix *= root
+    matrix[:1] = _root(1.0 / n)
+    matrix.setflags(write=False)
+    return matrix
+
+
+def _quarter(n: int) -> Floats:
+    """cos(m pi / (2 n)) for m = 0 to n."""
+    m = np.arange(n + 1)
+    x = (np.minimum(m, n - m) * HALF_PI) / n  # COS-01
+    square = x * x
+    cosine, sine = np.ones(n + 1), np.ones(n + 1)
+    for i in range(9, 0, -1):
+        cosine = 1.0 - square * cosine / ((2 * i - 1) * (2 * i))
+        sine = 1.0 - square * sine / ((2 * i) * (2 * i + 1))
+    return np.where(2 * m <= n, cosine, x * sine)  # COS-01
+
+
+def _root(value: float) -> float:
+    """The square root of a number from 2^-20 to 2."""
+    root = 1.0
+    for _ in range(NEWTON_STEPS):
+        root = (root + value / root) / 2.0
+    return root  # COS-01
+
+
+BLOCK = 128  # frames; coefficients, magnitudes and ranks of 31 points then fit the second cache
+
+
+@kernel
+def truncate(
+    columns: Floats2, rows: Floats2, basis: Floats2, n_kept: int, n_counted: int, products: Floats2
+) -> float:
+    """Keep the ``n_kept`` largest coefficients of every frame.
+
+    ``columns`` (J, N) and ``rows`` (N, J) are the same frames m; ``basis`` (J, J) has the basis
+    vectors as rows. ``products`` (J, J) becomes the sum over frames of e m^T, e being what is kept
+    of basis @ m. Of equal magnitudes that with the lower index is kept. Returns the sum of the
+    squares of all but the ``n_counted`` largest.
+    """
+    n_points, n_frames = columns.shape
+    coefficients = np.empty((n_points, BLOCK))
+    magnitudes = np.empty((n_points, BLOCK))
+    ranks = np.empty((n_points, BLOCK), np.int64)
+    products[:] = 0.0
+    dropped = 0.0
+    for start in range(0, n_frames, BLOCK):
+        width = min(BLOCK, n_frames - start)
+        for k in range(n_points):
+            line = coefficients[k]
+            line[:] = 0.0
+            for j in range(n_points):
+                factor = basis[k, j]
+                source = columns[j, start : start + width]
+                for i in range(width):
+                    line[i] += factor * source[i]
+            for i in range(width):
+                magnitudes[k, i] = abs(line[i])
+                ranks[k, i] = 0
+        for k in range(1, n_points):
+            for l in range(k):  # noqa: E741
+                for i in range(width):
+                    first = int(magnitudes[l, i] >= magnitudes[k, i])
+                    ranks[k, i] += first
+                    ranks[l, i] += 1 - first
+        for i in range(width):
+            frame = rows[start + i]
+            for k in range(n_points):
+                value = coefficients[k, i]
+                if ranks[k, i] >= n_counted:
+                    dropped += value * value
+                if ranks[k, i] < n_kept:
+                    for j in range(n_points):
+                        products[k, j] += value * frame[j]
+    return dropped
+
 
 Progress = Callable[[int, int], None]  # iterations done, iterations at most
 
