@@ -237,7 +237,7 @@ def test_peers_say_what_they_code(case: Case) -> None:
 def test_whole_run_with_report(
     case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
-    from mcz.cli.bench import bench_command
+    from mcz.cli.codecs import bench_command
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(tasks, "default_folder", lambda: tmp_path / "cache")
@@ -281,7 +281,7 @@ def test_whole_run_with_report(
 
 
 def test_errors_are_one_line(samples: Path, tmp_path: Path, capsys: Any) -> None:
-    from mcz.cli.bench import bench_command
+    from mcz.cli.codecs import bench_command
 
     walk = str(samples / "walk.amc")
     assert run_command(bench_command, "bench", [str(tmp_path / "no.amc")]) == 1
@@ -329,7 +329,7 @@ def test_a_clip_of_markers(samples: Path) -> None:
 
 
 def test_without_clips_it_takes_a_walk_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
-    from mcz.cli.bench import bench_command
+    from mcz.cli.codecs import bench_command
 
     options = ["--codecs", "qbc:khan2014", "--no-speeds", "--no-cache", "--jobs", "1", "--json"]
     assert run_command(bench_command, "bench", options) == 0

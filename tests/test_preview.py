@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
-from mcz.cli.clip_selection import preview_motion
+from mcz.cli.decode_options import preview_motion
 from mcz.errors import OptionError
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.model.motion import Motion, Signal

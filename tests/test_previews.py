@@ -15,11 +15,10 @@ from hypothesis import strategies as st
 import mcz
 from mcz.cli.common import run
 from mcz.cli.info import info_command
-from mcz.cli.info_lines import LEVELS, PLAIN_LEVELS, bar, bars_of, sparkline
+from mcz.cli.info_lines import CELLS, LEVELS, PLAIN_LEVELS, bar, bars_of, motion_energy, sparkline
 from mcz.errors import FormatError
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.model.motion import Motion
-from mcz.show.pictures.energy import CELLS, motion_energy
 from tests.motions import smooth
 
 Call = Any
@@ -124,7 +123,7 @@ def test_on_a_terminal_it_is_there_by_itself(
     assert "mean speed" in call(walk)[1]
     assert "mean speed" not in call(walk, "--no-preview")[1]
     assert "preview" not in call(walk, "--json")[1]
-    monkeypatch.setattr("mcz.show.pictures.energy.CHEAP", 1000)
+    monkeypatch.setattr("mcz.cli.info_lines.CHEAP", 1000)
     assert "mean speed" not in call(walk)[1]
     assert "mean speed" in call(walk, "--preview")[1]
 

@@ -18,11 +18,10 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Joint, MczError, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.model import extras
-from mcz.show.pictures import canvases, tracks
+from mcz.show.pictures import bodies, canvases
 from mcz.show.pictures.bodies import MIDDLE, body_of, remove_false_bones
-from mcz.show.pictures.cameras import VIEWS, Viewport
 from mcz.show.pictures.canvases import THEMES, rgb
-from mcz.show.pictures.capsules import Shapes, capsules
+from mcz.show.pictures.capsules import VIEWS, Shapes, Viewport, capsules
 from mcz.show.pictures.rendering import film_frames
 from mcz.show.pictures.stages import stage_of
 from tests.commands import run
@@ -68,7 +67,7 @@ def test_left_and_right_are_where_they_belong(
 
 
 def test_the_floor_is_below_the_feet_and_all_is_seen(walk: Motion) -> None:
-    track = tracks.track_of(walk, np.arange(0, 240, 8), "cm", None)
+    track = bodies.track_of(walk, np.arange(0, 240, 8), "cm", None)
     for view in VIEWS:
         stage = stage_of(track, THEMES["light"], view, Viewport(10, 20, 300, 200), None, 15.0)
         for number, (_, nodes) in enumerate(track):
@@ -114,7 +113,7 @@ def test_every_up_axis_gives_the_same_picture(tmp_path: Path) -> None:
 
 
 def pieces_drawn(motion: Motion, frame: int = 0) -> int:
-    track = tracks.track_of(motion, np.arange(motion.n_frames), None, "y")
+    track = bodies.track_of(motion, np.arange(motion.n_frames), None, "y")
     stage = stage_of(track, THEMES["light"], "front", Viewport(0, 0, 100, 100), None, 1.0)
     shadows, figures = Shapes(), Shapes()
     nodes = dict(track)[frame]
@@ -214,9 +213,9 @@ def test_blocks_are_positions(
     """A clip of a file is read in blocks, of which each frame is that of the whole."""
     mcz.write(walk, tmp_path / "a.mcz")
     wanted = mcz.positions(walk)
-    monkeypatch.setattr(tracks, "BLOCK", 4000)
+    monkeypatch.setattr(bodies, "BLOCK", 4000)
     with mcz.open(tmp_path / "a.mcz") as file:
-        track = tracks.track_of(file.clips["walk"], np.arange(3, 240, 7), None, "y")
+        track = bodies.track_of(file.clips["walk"], np.arange(3, 240, 7), None, "y")
         names, shown = file.clips["walk"].joint_names, dict(track)
         sizes = [len(frames) for frames, _ in track.blocks()]
     assert list(shown) == list(range(3, 240, 7))

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.codecs import raw
-from mcz.codecs.wavelet import mrdwt
+from mcz.codecs.wavelet.threshold_codecs import MRDWT
 from mcz.errors import AccessError, MotionError, OptionError
 from mcz.files.editing.recoding import recorded_options
 from mcz.model.motion import Channel, Motion, Signal
@@ -325,7 +325,7 @@ def test_a_lossless_clip_has_no_record() -> None:
 
 def test_recorded_options_forgive() -> None:
     said = {"param.T_g": "0.5", "param.Q": "many", "param.kbps": "3", "param.wavelet": "db2"}
-    options = recorded_options(mrdwt.CODEC, said)
+    options = recorded_options(MRDWT, said)
     assert (options["T_g"], options["Q"], options["kbps"]) == (0.5, None, None)
     assert options["preset"] == "default" and options["wavelet"] == "db2"
 

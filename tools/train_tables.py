@@ -30,8 +30,8 @@ from mcz.codecs.online import online
 from mcz.codecs.pca import pca
 from mcz.codecs.pca import streams as pca_streams
 from mcz.codecs.spatial import lsdt_frame, window_codecs, windows
-from mcz.codecs.wavelet import mrdwt
 from mcz.codecs.wavelet import streams as wavelet_streams
+from mcz.codecs.wavelet.threshold_codecs import MRDWT
 from mcz.files.writing.planning import prepare
 from mcz.files.writing.signal_source import MemorySource
 from mcz.model.motion import Motion
@@ -54,7 +54,7 @@ class Plan:
 PLANS = {
     "wavelet": Plan(
         wavelet_streams,
-        mrdwt.CODEC,
+        MRDWT,
         (residuals.N_MIXERS,) * wavelet_streams.N_SETS,
         24,
         (

@@ -7,9 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
-from mcz.cli.clip_selection import ClipSelection, FilteredSelection, PreviewSelection
 from mcz.cli.common import Exit, Failure
-from mcz.cli.decode_options import EVENTS, DecodeOptions
+from mcz.cli.decode_options import (
+    EVENTS,
+    ClipSelection,
+    DecodeOptions,
+    FilteredSelection,
+    PreviewSelection,
+)
 from mcz.cli.outputs import Output
 from mcz.files.reading.fidelity import CONVERTED, RESTORED
 from mcz.model.types import JsonObject

@@ -1,21 +1,33 @@
-"""Options and input of ``mcz decode`` and ``mcz convert``, and checks of their combinations."""
+"""Options, input and selected parts of ``mcz decode`` and ``mcz convert``, and their checks.
+
+A selection of a clip is written as a source file, a motion or a table.
+"""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from hashlib import sha256
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mcz.cli.common import Exit, Failure, errors_about, open_input, require_file, say
 from mcz.cli.hints import in_options
 from mcz.cli.outputs import CONVERSIONS, SCENES
-from mcz.model.types import Params
+from mcz.files.reading.fidelity import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
+from mcz.model.types import Params, Values
 
 if TYPE_CHECKING:
+    from mcz.files.reading.clip import Clip
     from mcz.files.reading.file import File
+    from mcz.files.tables import Event, Table
+    from mcz.model.clock import Timeline
+    from mcz.model.motion import Motion
 
 
 EVENTS = "events"  # a signal that tables make of a recording
@@ -146,3 +158,170 @@ class Input:
                 say(f"{self.file}: {in_options(note)}")
             with mcz.open(coded.getvalue(), max_decoded=NO_LIMIT) as file:
                 yield file, written.inputs
+
+
+@dataclass(frozen=True, slots=True)
+class ClipSelection:
+    """Selected frames of a clip at a resolution; ``rate`` is used if the clip states none."""
+
+    clip: Clip
+    frames: tuple[int, int] | None
+    resolution: int
+    decimate: bool
+    rate: Fraction | None
+
+    def source_bytes(self) -> bytes:
+        """The source file, of these frames."""
+        return self.clip.source_bytes(self.frames, self.resolution, decimate=self.decimate)
+
+    def fidelity(self, data: bytes) -> str:
+        """A word for the fidelity of its ``source_bytes``, ``data``, to the source file."""
+        whole, source = fidelity_of(self.clip), self.clip.source
+        if whole == LOSSY or self.resolution:
+            return LOSSY
+        is_checked = self.frames is None and not self.clip.container.salvage
+        if is_checked or (source is not None and sha256(data).digest() == source.sha256):
+            return whole
+        return CUT if self.frames is not None else SALVAGED
+
+    def motion(self) -> Motion:
+        return self.clip.motion(self.frames, self.resolution, decimate=self.decimate)
+
+    def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
+        """The channels of ``joints``, under their ``names``."""
+        values, mask = self.clip.read_masked(self.frames, joints, self.resolution)
+        return self._table(values, mask, 0, names)
+
+    def of_signal(self, signal: int, stored: bool, names: list[str], units: list[str]) -> Table:
+        """All channels of another signal, in their units, or as ``stored``."""
+        values, mask = self.clip.read_masked(self.frames, None, self.resolution, signal=signal)
+        scaling = self.clip.scaling(signal)
+        if scaling is not None:
+            if stored:
+                units = [""] * len(units)
+            else:
+                values = scaling.values(values)
+        return self._table(values, mask, signal, names, units)
+
+    def events(self, events: Sequence[Event]) -> list[Event]:
+        """The events within the selected frames, by time."""
+        timeline, (start, stop) = self._timeline(), self.frames or (0, self.clip.n_frames)
+        if self.frames is None or timeline is None or start == stop:
+            return list(events)
+        first, last = timeline.times[start], timeline.times[stop - 1]
+        return [event for event in events if first <= event.time <= last]
+
+    def _table(
+        self,
+        values: Values,
+        mask: NDArray[np.bool_] | None,
+        signal: int,
+        names: list[str],
+        units: Sequence[str] = (),
+    ) -> Table:
+        from mcz.files.reading.views import decimate_rows
+        from mcz.files.tables import Table
+
+        clip, per_frame = self.clip, self.clip.signals[signal].samples_per_frame
+        mask = np.ones(values.shape, np.bool_) if mask is None else mask
+        start, stop = self.frames or (0, clip.n_frames)
+        numbers, rate = clip.frame_numbers[start:stop], self.rate or clip.frame_rate
+        timeline = self._timeline()
+        times = None
+        if timeline is not None:
+            times = timeline.samples(per_frame)[start * per_frame : stop * per_frame]
+        if self.decimate:
+            step = 2**self.resolution
+            values = decimate_rows(values, per_frame, step)
+            mask = decimate_rows(mask, per_frame, step)
+            numbers, rate = numbers[::step], rate and rate / step
+            if times is not None:
+                times = decimate_rows(times[:, None], per_frame, step)[:, 0]
+        return Table(
+            names,
+            _floats(values),
+            mask,
+            _repeated(numbers, len(values)),
+            rate,
+            units,
+            times=times,
+            samples_per_frame=per_frame,
+        )
+
+    def _timeline(self) -> Timeline | None:
+        return self.clip.timeline_at(self.rate)
+
+
+class FilteredSelection(ClipSelection):
+    """The same of a ``FilteredClip``."""
+
+    def fidelity(self, data: bytes) -> str:
+        return FILTERED
+
+
+class PreviewSelection(ClipSelection):
+    """The frames of a clip that can be read without decoding the rest."""
+
+    def motion(self) -> Motion:
+        return preview_motion(self.clip)
+
+    def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
+        from mcz.files.tables import Table
+
+        preview = self.clip.previewed(joints)
+        numbers, rate = self.clip.frame_numbers[preview.frames], self.clip.frame_rate
+        timeline = self._timeline()
+        return Table(
+            names,
+            _floats(preview.values),
+            np.ones(preview.values.shape, np.bool_) if preview.mask is None else preview.mask,
+            _repeated(numbers, len(preview.values)),
+            rate / preview.step if rate is not None and preview.is_regular else None,
+            times=None if timeline is None else timeline.times[preview.frames],
+        )
+
+
+def preview_motion(clip: Clip) -> Motion:
+    """The preview as a motion at a lower frame rate, without the further signals and the source.
+
+    A last frame that is nearer to the one before is left out.
+    """
+    from mcz.model.clock import Timeline
+    from mcz.model.motion import Motion, Signal
+
+    preview = clip.previewed()
+    gaps = np.diff(preview.frames)
+    n_frames = len(preview.frames) - int(len(gaps) > 0 and gaps[-1] != preview.step)
+    info, rate = clip.signals[0], clip.frame_rate
+    n_rows = n_frames * info.layout.samples_per_frame
+    signal = Signal(
+        values=preview.values[:n_rows],
+        grids=info.grids,
+        name=info.name,
+        samples_per_frame=info.layout.samples_per_frame,
+        mask=None if preview.mask is None else preview.mask[:n_rows],
+        channels=info.channels,
+        role=info.role if info.of is None else "",
+    )
+    frames, timeline = preview.frames[:n_frames], clip.timeline
+    motion = Motion(
+        skeleton=clip.skeleton,
+        signals=(signal,),
+        frame_rate=None if rate is None else rate / preview.step,
+        frame_rate_exact=clip.frame_rate_exact,
+        name=clip.name,
+        metadata=clip.metadata,
+        frame_numbers=clip.frame_numbers[frames],
+        number_step=preview.step,
+    )
+    if timeline is not None:
+        timeline = Timeline(timeline.times[frames], motion.frame_rate, timeline.rounding)
+    return motion.at_times(timeline)
+
+
+def _floats(values: Values) -> NDArray[np.float64]:
+    return np.asarray(values, dtype=np.float64)
+
+
+def _repeated(numbers: NDArray[np.int64], n_rows: int) -> NDArray[np.int64]:
+    return np.repeat(numbers, n_rows // max(1, len(numbers)))

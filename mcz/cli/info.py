@@ -143,7 +143,7 @@ def _add_previews(file: File, document: JsonObject, as_json: bool, preview: bool
         return
     if not as_json and len(document["clips"]) > CLIPS_IN_FULL:
         return
-    from mcz.show.pictures.energy import is_cheap
+    from mcz.cli.info_lines import is_cheap
 
     for clip in document["clips"]:
         stored = file.clips[clip["name"]]

@@ -51,8 +51,8 @@ from mcz.model.types import JsonObject, Settings
 if TYPE_CHECKING:
     from mcz.files.reading.clip import Clip
     from mcz.model.motion import Motion
-    from mcz.show.viewing.embedding import PageWritten
     from mcz.show.viewing.file_registry import FileRegistry
+    from mcz.show.viewing.page import PageWritten
 
 
 FACT_OPTIONS = ("skeleton", "rate", "unit", "up", "arrays", "model")  # facts that a file may lack
@@ -205,8 +205,7 @@ def _serve(
 def _write_page(registry: FileRegistry, output: str, as_json: bool, options: Settings) -> Exit:
     from pathlib import Path
 
-    from mcz.show.viewing.embedding import MOST_BYTES, PageOptions, write_page
-    from mcz.show.viewing.page import page
+    from mcz.show.viewing.page import MOST_BYTES, PageOptions, page, write_page
 
     force, most = options.pop("force"), options.pop("most") or MOST_BYTES
     if "://" not in output:

@@ -5,7 +5,7 @@ from __future__ import annotations
 UNITS: dict[str, tuple[str, ...]] = {
     "fast": (
         "mcz.codecs.coding.fast.decode_kernels",
-        "mcz.codecs.coding.fast.parent_kernels",
+        "mcz.codecs.coding.fast.encoder",
         "mcz.codecs.coding.fast.plan_kernels",
         "mcz.codecs.coding.fast.residual_kernels",
         "mcz.codecs.coding.fast.survey_kernels",

@@ -17,8 +17,7 @@ import pytest
 import mcz
 from mcz.codecs import CODECS
 from mcz.model.extras import annex_bytes
-from mcz.show.viewing.embedding import TABLES, element, tables_for
-from mcz.show.viewing.page import page
+from mcz.show.viewing.page import TABLES, element, page, tables_for
 from tests.commands import run
 from tests.motions import smooth
 
@@ -228,7 +227,7 @@ def test_what_a_codec_needs_is_there(tmp_path: Path) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("no node")
-    from mcz.show.viewing.embedding import deflate_annexes
+    from mcz.show.viewing.page import deflate_annexes
 
     motion = smooth(40)
     documents = []

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from mcz.bench.tasks import Cache, Runner, default_folder
-from mcz.cli.bench import show
+from mcz.cli.codecs import show
 from mcz.cli.common import Exit, errors_about, require_file, run
 from mcz.cli.options import json_option, unit_option
 from mcz.cli.terminal import Progress

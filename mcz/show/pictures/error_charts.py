@@ -16,14 +16,12 @@ from mcz.kinematics.metrics.joint_errors import joint_errors, pairs_of
 from mcz.kinematics.metrics.sums import Distances, scale_figure
 from mcz.model.motion import Motion
 from mcz.model.types import Settings
-from mcz.show.pictures.bodies import MIDDLE
-from mcz.show.pictures.cameras import Viewport
+from mcz.show.pictures.bodies import MIDDLE, Track, track_of
 from mcz.show.pictures.canvases import Theme, import_library
-from mcz.show.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
+from mcz.show.pictures.capsules import Shapes, Viewport, add_figure, add_shadow, pieces_of
 from mcz.show.pictures.channel_charts import times_of
 from mcz.show.pictures.charts import Chart, Sheet, legend, line, name_ticks, number, rows_of, style
 from mcz.show.pictures.stages import stage_of
-from mcz.show.pictures.tracks import Track, track_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

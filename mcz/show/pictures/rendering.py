@@ -20,13 +20,10 @@ from mcz.kinematics.poses.motion_like import Frames, MotionLike, frame_range
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.clock import Timeline
 from mcz.model.types import Ints
-from mcz.show.pictures.bodies import LEFT, RIGHT, Flags
-from mcz.show.pictures.cameras import Viewport
-from mcz.show.pictures.canvases import Canvas, Drawing, Theme, Word, import_library, theme_of
-from mcz.show.pictures.capsules import Shapes
-from mcz.show.pictures.encoders import film
+from mcz.show.pictures.bodies import LEFT, RIGHT, Flags, track_of
+from mcz.show.pictures.canvases import Canvas, Drawing, Theme, Word, film, import_library, theme_of
+from mcz.show.pictures.capsules import Shapes, Viewport
 from mcz.show.pictures.stages import MARGIN, Stage, drawing_of, label_texts, shorten, stage_of
-from mcz.show.pictures.tracks import track_of
 
 FILMS = {".gif": Fraction(25), ".mp4": Fraction(30), ".webm": Fraction(30)}
 STILLS = (".png", ".svg")

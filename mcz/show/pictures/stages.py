@@ -8,11 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcz.kinematics.chain import Floats
-from mcz.show.pictures.bodies import LEFT, RIGHT, are_known
-from mcz.show.pictures.cameras import Camera, Viewport, axes_of, fit_camera
+from mcz.show.pictures.bodies import LEFT, RIGHT, Track, are_known
 from mcz.show.pictures.canvases import Drawing, Theme, Word, rgb
-from mcz.show.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
-from mcz.show.pictures.tracks import Track
+from mcz.show.pictures.capsules import (
+    Camera,
+    Shapes,
+    Viewport,
+    add_figure,
+    add_shadow,
+    axes_of,
+    fit_camera,
+    pieces_of,
+)
 
 ROAM = 1.1  # sizes of the figure that it may move about before the camera follows
 STILL = 0.35  # seconds over which a camera that follows is steadied

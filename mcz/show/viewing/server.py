@@ -1,22 +1,254 @@
-"""The server of the page: on this machine only, below an unguessable path."""
+"""The server of the page: on this machine only, below an unguessable path.
+
+tools/viewer/README.md, "The server", lists the requests of the page; no others are answered.
+"""
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import secrets
+import select
 import socket
 import sys
-from contextlib import suppress
-from http.server import ThreadingHTTPServer
+from collections.abc import Callable, Mapping
+from contextlib import closing, suppress
+from hmac import compare_digest
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
 from threading import BoundedSemaphore, Thread
-from typing import Any
+from typing import Any, cast
 
-from mcz.errors import AccessError, OptionError, reason_of
+from mcz.errors import AccessError, MczError, OptionError, reason_of
+from mcz.model.extras import annex_bytes, annex_names
+from mcz.model.types import JsonObject
 from mcz.show.viewing.file_registry import FileRegistry
-from mcz.show.viewing.handler import Handler
 from mcz.show.viewing.page import Page
+from mcz.show.viewing.requests import (
+    LONGEST_JSON,
+    Refused,
+    check_same,
+    check_sender,
+    is_known,
+    json_of,
+    length_of,
+    range_of,
+)
 from mcz.show.viewing.server_tasks import ServerTasks, Site, Visitors, lossy_codecs
+
+PULSE = 1.0  # seconds between two checks of an open page
+BEAT = 15  # pulses between two signs of life
+IDLE = 120  # seconds of silence after which a kept connection is closed
+STRICT_POLICY = "default-src 'none'; frame-ancestors 'none'; sandbox"
+SAFETY = {
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "X-Frame-Options": "DENY",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+JSON, BYTES = "application/json", "application/octet-stream"
+
+
+class Handler(BaseHTTPRequestHandler):
+    """Answers the requests of a connection, one after the other."""
+
+    protocol_version = "HTTP/1.1"
+    timeout = IDLE
+    command = "GET"  # until one is read
+    _unread = _has_answered = False  # unread posted bytes; an answer has begun
+
+    @property
+    def _site(self) -> Site:
+        return cast(Site, cast(Any, self.server).site)
+
+    def do_GET(self) -> None:
+        self._guarded(self._get, unread=False)
+
+    def do_HEAD(self) -> None:
+        self._guarded(self._get, unread=False)
+
+    def do_POST(self) -> None:
+        self._guarded(self._post, unread=True)
+
+    def _guarded(self, answer: Callable[[str], None], *, unread: bool) -> None:
+        """Answer an allowed request; answer others with the reason."""
+        self._unread, self._has_answered = unread, False
+        try:
+            answer(self._route())
+        except Refused as refused:
+            self._fail(refused.status, "Refused", str(refused))
+        except MczError as error:
+            self._fail(422, type(error).__name__, error.describe(self._site.registry.hints))
+        except MemoryError:
+            self._fail(507, "MemoryError", "out of memory")
+
+    def _route(self) -> str:
+        """Path below the token; raises Refused for a request without it."""
+        if self.request_version not in ("HTTP/1.0", "HTTP/1.1"):
+            raise Refused(505, "the server requires HTTP/1.1")
+        check_sender(self.headers, self._site.port)
+        if self.command != "POST" and self.headers.get("Content-Length", "0") != "0":
+            raise Refused(400, "a GET request must have no body")
+        before, *below = self.path.partition("?")[0].split("/", 2)
+        token = below[0] if below else ""
+        known = compare_digest(token.encode("utf-8", "replace"), self._site.token.encode())
+        if before or not known or len(below) != 2:
+            raise Refused(404, "there is nothing here")
+        return below[1]
+
+    # Resources to get ------------------------------------------------------------
+
+    def _get(self, path: str) -> None:
+        if path == "":
+            self._send(self._site.page.text.encode(), "text/html; charset=utf-8", 200)
+        elif path == "api.json":
+            self._send_json(self._site.work.document())
+        elif path == "alive":
+            self._alive()
+        elif match := re.fullmatch(r"files/([0-9]{1,9})", path):
+            self._file(int(match[1]))
+        elif path.removeprefix("annex/") in annex_names("*") and path.startswith("annex/"):
+            self._send(annex_bytes(path.removeprefix("annex/")), BYTES, 200)
+        else:
+            raise Refused(404, "there is nothing here")
+
+    def _file(self, number: int) -> None:
+        try:
+            file = self._site.registry[number]
+        except KeyError:
+            raise Refused(404, "no such file") from None
+        with closing(file.open()) as contents:
+            headers = {"ETag": contents.tag, "Accept-Ranges": "bytes"}
+            check_same(self.headers, contents.tag)
+            if is_known(self.headers, contents.tag):
+                self._head(304, {"ETag": contents.tag, "Cache-Control": "private, no-cache"})
+                return
+            start, stop, status = 0, contents.size, 200
+            byte_range = None
+            if self.command == "GET":
+                try:
+                    byte_range = range_of(self.headers, contents.size, contents.tag)
+                except Refused as refused:
+                    size = {"Content-Range": f"bytes */{contents.size}"}
+                    self._fail(refused.status, "Refused", str(refused), size)
+                    return
+            if byte_range is not None:
+                (start, stop), status = byte_range, 206
+                headers["Content-Range"] = f"bytes {start}-{stop - 1}/{contents.size}"
+            headers |= {"Content-Length": str(stop - start), "Content-Type": BYTES}
+            self._head(status, {**headers, "Cache-Control": "private, no-cache"})
+            if self.command == "HEAD":
+                return
+            for piece in contents.pieces(start, stop):
+                self.wfile.write(piece)
+                start += len(piece)
+            self.close_connection = self.close_connection or start != stop
+
+    def _alive(self) -> None:
+        """Keep an event stream open as long as the page is."""
+        self.close_connection = True
+        if self.command == "HEAD":
+            self._head(200, {"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
+            return
+        with self._site.visitors as visitors:
+            head = {"Content-Type": "text/event-stream", "Connection": "close"}
+            self._head(200, {**head, "Cache-Control": "no-store"})
+            pulses = 0
+            while not self._is_gone():
+                if pulses % BEAT == 0:
+                    self.wfile.write(b": here\n\n")
+                if not visitors.stay(PULSE):
+                    self.wfile.write(b"event: end\ndata: \n\n")
+                    break
+                pulses += 1
+
+    def _is_gone(self) -> bool:
+        """Return True if the other side has closed the connection."""
+        try:
+            readable, _, _ = select.select([self.connection], [], [], 0)
+            return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
+        except (OSError, ValueError):
+            return True
+
+    # Tasks to post ---------------------------------------------------------------
+
+    def _post(self, path: str) -> None:
+        work = self._site.work
+        if path == "convert":
+            size = length_of(self.headers, work.most_posted)
+            result = work.convert(self.rfile, size, self.headers.get("Content-Type", ""))
+            self._unread = False
+            self._send_json(result)
+            return
+        tasks: Mapping[str, Callable[[JsonObject], object]] = {
+            "encode": work.encode,
+            "diff": work.diff,
+            "glb": work.glb,
+        }
+        if path not in tasks:
+            raise Refused(404, "there is nothing here")
+        if self.headers.get_content_type() != JSON:
+            raise Refused(415, "requests must be posted as application/json")
+        data = self.rfile.read(length_of(self.headers, LONGEST_JSON))
+        self._unread = False
+        document = json_of(data)
+        with work.turn(self._is_gone):
+            answer = tasks[path](document)
+        if isinstance(answer, bytes):
+            self._send(answer, "model/gltf-binary", 200)
+        else:
+            self._send_json(answer)
+
+    # Format of answers -----------------------------------------------------------
+
+    def _send_json(self, document: object) -> None:
+        self._send(json.dumps(document, allow_nan=False).encode(), JSON, 200)
+
+    def _send(
+        self, data: bytes, kind: str, status: int, more: Mapping[str, str] | None = None
+    ) -> None:
+        head = {"Content-Type": kind, "Content-Length": str(len(data)), "Cache-Control": "no-store"}
+        self._head(status, {**head, **(more or {})})
+        if self.command != "HEAD":
+            self.wfile.write(data)
+
+    def _head(self, status: int, headers: Mapping[str, str]) -> None:
+        self._has_answered = True
+        is_page = headers.get("Content-Type", "").startswith("text/html")
+        policy = f"{self._site.page.policy}; frame-ancestors 'none'" if is_page else STRICT_POLICY
+        self.send_response(status)
+        for name, value in {**headers, **SAFETY, "Content-Security-Policy": policy}.items():
+            self.send_header(name, value)
+        if self.close_connection and "Connection" not in headers:
+            self.send_header("Connection", "close")
+        self.end_headers()
+
+    def _fail(
+        self, status: int, kind: str, text: str, more: Mapping[str, str] | None = None
+    ) -> None:
+        """Send the error, unless the answer has begun."""
+        self.close_connection = self.close_connection or self._unread
+        if self._has_answered:
+            self.close_connection = True
+            return
+        error = {"class": kind, "message": " ".join(text.split())}
+        self._send(json.dumps({"error": error}).encode(), JSON, status, more)
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Answer malformed requests and unknown methods, as the library reports them."""
+        self.close_connection = True
+        self._has_answered = False
+        self._fail(int(code), "Refused", self.responses.get(int(code), ("refused",))[0])
+
+    def version_string(self) -> str:
+        return "mcz"
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Log nothing, for privacy."""
+
 
 GRACE = 5.0  # seconds in which a page may come back, such as on a reload
 MOST_CONNECTIONS = 128

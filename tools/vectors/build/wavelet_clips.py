@@ -21,7 +21,8 @@ from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.parameters import SCALED
 from mcz.codecs.transforms import wavelets
 from mcz.codecs.transforms.wavelets import Wavelet, by_id
-from mcz.codecs.wavelet import mrdwt, streams
+from mcz.codecs.wavelet import streams
+from mcz.codecs.wavelet.threshold_codecs import MRDWT
 from mcz.model.motion import Motion
 from mcz.model.schema import varint
 from tools.vectors.build.files import file_of, partial
@@ -219,7 +220,7 @@ def codec_of(plan: Plan, channels: Sequence[Wave]) -> Codec:
         return Encoded(header(plan), iter(_segments(plan, channels)), plan.resolutions)
 
     parameters = raw.CODEC.parameters
-    return replace(mrdwt.CODEC, encode=encode, parameters=parameters, dial=None)
+    return replace(MRDWT, encode=encode, parameters=parameters, dial=None)
 
 
 def values_of(plan: Plan, channels: Sequence[Wave], resolution: int = 0) -> NDArray[np.float64]:
@@ -233,7 +234,7 @@ def values_of(plan: Plan, channels: Sequence[Wave], resolution: int = 0) -> NDAr
     def fetch(segment: int, band: int, group: int) -> bytes:
         return made[segment].streams[band * n + group]
 
-    values: NDArray[np.float64] = mrdwt.CODEC.decode(header(plan), layout, spans, request, fetch)
+    values: NDArray[np.float64] = MRDWT.decode(header(plan), layout, spans, request, fetch)
     return values
 
 
