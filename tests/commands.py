@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -37,6 +38,21 @@ Call = Callable[..., Result]
 def run(*arguments: Any) -> int:
     """The exit code of ``mcz`` with these arguments."""
     return int(run_command(cli, "mcz", [str(argument) for argument in arguments]))
+
+
+def run_piped(*arguments: Any, data: bytes = b"") -> tuple[int, bytes, str]:
+    """Exit code, standard output and standard error of ``mcz``, in this process."""
+    before = sys.stdin, sys.stdout, sys.stderr
+    streams = [io.TextIOWrapper(io.BytesIO(part), "utf-8") for part in (data, b"", b"")]
+    sys.stdin, sys.stdout, sys.stderr = streams
+    try:
+        code = run(*arguments)
+        for stream in streams[1:]:
+            stream.flush()
+    finally:
+        sys.stdin, sys.stdout, sys.stderr = before
+    out, errors = (stream.buffer.getvalue() for stream in streams[1:])
+    return code, out, errors.decode()
 
 
 def fails(result: Result, code: int, *words: str) -> None:

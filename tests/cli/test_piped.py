@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,7 +15,8 @@ from mcz.files.live.generators import StrictFrames
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.writing.file import EncodingOptions
 from mcz.sources import FORMATS
-from tests.commands import ENV, ROOT, Started
+from tests.commands import Started
+from tests.commands import run_piped as run
 from tests.live_codec import encode_live
 
 HEADER = (
@@ -49,18 +48,6 @@ def asf(tmp_path: Path) -> Path:
     path = tmp_path / "knee.asf"
     path.write_bytes(ASF)
     return path
-
-
-def run(*arguments: str | Path, data: bytes = b"", cwd: Path = ROOT) -> tuple[int, bytes, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "mcz", *map(str, arguments)],
-        check=False,
-        input=data,
-        capture_output=True,
-        cwd=cwd,
-        env=ENV,
-    )
-    return done.returncode, done.stdout, done.stderr.decode()
 
 
 def test_each_frame_is_out_before_the_next_line_is_read() -> None:
