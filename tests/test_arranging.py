@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import io
 import os
 from pathlib import Path
@@ -271,24 +270,6 @@ def test_a_file_that_somebody_grows_is_left_alone(files: tuple[Path, Path]) -> N
         pytest.raises(mcz.AccessError, match="another process"),
     ):
         mcz.delete_clips(files[0], "walk")
-
-
-def test_a_full_disk_leaves_the_old_file(
-    files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from mcz.container import writer
-
-    a, _ = files
-    before = a.read_bytes()
-
-    def full(self: writer.Writer, row: object, payload: bytes) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(writer.Writer, "begin_carried", full)
-    with pytest.raises(mcz.AccessError, match="No space"):
-        mcz.reorder_clips(a, by="name")
-    assert a.read_bytes() == before
-    assert sorted(p.name for p in a.parent.iterdir()) == ["a.mcz", "b.mcz"]
 
 
 @settings(max_examples=amount(60, 25), suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -101,27 +101,6 @@ def test_all_of_them_may_be_bad_at_once(archive_bytes: bytes) -> None:
     assert content(bad, salvage=True) == content(archive_bytes)
 
 
-@pytest.mark.parametrize("codec", ["fast", "raw"])
-def test_bit_rot(folder: Path, codec: str) -> None:
-    """A byte anywhere: only the DATA that has it is lost, each loss is named, no value wrong."""
-    out = io.BytesIO()
-    mcz.pack(folder, out, codec=codec)
-    data, draw = out.getvalue(), random.Random(codec)
-    spans = [(c.offset, c.offset + c.size) for c in chunks(data, b"DATA")]
-    truth = signals(data)
-    for number in range(60):
-        at = len(data) * number // 60 + draw.randrange(len(data) // 60)
-        n_lost = 0
-        bad = change_bytes(data, at)
-        for name, values in signals(bad, salvage=True).items():
-            lost = np.isnan(values).all(axis=1) & ~np.isnan(truth[name]).all(axis=1)
-            np.testing.assert_array_equal(values[~lost], truth[name][~lost])
-            n_lost += int(lost.sum())
-        assert bool(n_lost) == any(a <= at < b for a, b in spans)
-        with mcz.open(bad, salvage=True) as file:
-            assert file.damage
-
-
 def signals(data: bytes, *, salvage: bool = False) -> dict[tuple[str, int], np.ndarray]:
     with mcz.open(data, salvage=salvage) as file:
         return {

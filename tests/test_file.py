@@ -109,17 +109,6 @@ def test_output_limit() -> None:
         assert file.clips["smooth"].read((0, 12)).shape == (12, 10)
 
 
-def test_failed_write_leaves_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcz"
-    mcz.write(smooth(5), path)
-    before = path.read_bytes()
-    signal = Signal(np.full((2, 10), 1 / 3), (Grid(GridKind.BINARY32),) * 10)
-    with pytest.raises(mcz.MotionError):
-        mcz.write(replace(smooth(2), signals=(signal,)), path, force=True)
-    assert path.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == ["a.mcz"]
-
-
 def test_limits_of_the_profile() -> None:
     joints = tuple(mcz.Joint(f"j{i}", channels=(mcz.Channel("rx"),)) for i in range(4097))
     bones = mcz.Skeleton(joints)

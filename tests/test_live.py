@@ -9,7 +9,6 @@ import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -24,10 +23,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.container.chunks import (
-    CHECK_SIZE,
     END,
-    FRAME,
-    SEGMENT,
     Packet,
     build_chunk,
     build_packet,
@@ -38,11 +34,10 @@ from mcz.files.live.reader_with_losses import FramesWithLosses, StreamSummary
 from mcz.files.live.writer import LiveWriter
 from mcz.files.reading.clips import packet_framing
 from mcz.files.reading.report import info
-from mcz.files.reading.sizes import layout
 from mcz.files.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.motions import skeleton, smooth
-from tests.repair import flip_bit, parts_of, use, with_packets
+from tests.repair import parts_of, use, with_packets
 
 ROOT = Path(mcz.__file__).parent.parent
 
@@ -68,25 +63,6 @@ def live(values: np.ndarray, **params: object) -> bytes:
         for row in values:
             writer.push(row)
     return out.getvalue()
-
-
-def test_reads_like_any_clip() -> None:
-    values = frames()
-    data = live(values)
-    assert mcz.verify(data) == []
-    with mcz.open(data) as file:
-        clip = file.clips["live"]
-        np.testing.assert_array_equal(clip.read(), values)
-        np.testing.assert_array_equal(clip.read((9, 14)), values[9:14])
-        np.testing.assert_array_equal(clip.read((8, 9), ["spine"]), values[8:9, 6:9])
-        assert clip.read(joints=[]).shape == (23, 0)
-        assert clip.frame_rate == 120
-        kinds = [row.packet for row in clip.signals[0].rows]
-        assert [i for i, kind in enumerate(kinds) if kind == SEGMENT] == [0, 7, 8, 10, 20]
-        assert {*kinds} == {SEGMENT, FRAME}
-        assert sum(size for _, size, _ in layout(file)) == len(data)
-    use(data)
-    use(data, salvage=True)
 
 
 def test_numbers_of_missing_frames_come_with_the_end() -> None:
@@ -149,15 +125,6 @@ def test_any_number_of_frames(n: int, every: int, seed: int) -> None:
     )
     with mcz.open(data) as file:
         np.testing.assert_array_equal(file.clips["live"].read(), values)
-
-
-def test_each_frame_comes_with_its_last_byte() -> None:
-    values = frames()
-    data = live(values)
-    with mcz.open(data) as file:
-        ends = [row.stop + CHECK_SIZE for row in file.clips["live"].signals[0].rows]
-    stream = live_codec.Trickle(data)
-    assert [stream.at for _ in live_frames(stream)] == ends
 
 
 def test_one_write_a_frame() -> None:
@@ -277,40 +244,6 @@ def test_sizes_count_the_framing() -> None:
 # Damage ----------------------------------------------------------------------
 
 
-def test_every_prefix_is_truncated() -> None:
-    values = frames(13)
-    data = live(values)
-    with mcz.open(data) as file:
-        ends = [row.stop + CHECK_SIZE for row in file.clips["live"].signals[0].rows]
-        start = file.container.directory.clips["live"].clip
-    for size in range(len(data)):
-        with pytest.raises(mcz.TruncatedError):
-            mcz.open(data[:size])
-        whole = sum(end <= size for end in ends)
-        got = 0
-        with pytest.raises(mcz.TruncatedError):
-            for _ in live_frames(io.BytesIO(data[:size])):
-                got += 1
-        assert got == whole
-        if size >= start.offset + start.size and size % 5 == 0:
-            with mcz.open(data[:size], salvage=True) as file:
-                np.testing.assert_array_equal(file.clips["live"].read(), values[:whole])
-
-
-def test_flipped_bits_are_found() -> None:
-    data = live(frames(13))
-    with mcz.open(data) as file:
-        row = file.container.directory.clips["live"]
-        assert row.cend is not None
-        places = range(row.clip.offset + row.clip.size, row.cend.offset)
-    for byte in places:
-        bad = flip_bit(data, byte, byte % 8)
-        assert mcz.verify(bad) != [], byte
-        with pytest.raises(mcz.MczError):
-            list(live_frames(io.BytesIO(bad)))
-        use(bad, salvage=True)
-
-
 def with_body(data: bytes, frame: int, change: Callable[[bytes], bytes]) -> bytes:
     """The file, without an index, with another body of a packet, and the check of that."""
     number = -1
@@ -321,22 +254,6 @@ def with_body(data: bytes, frame: int, change: Callable[[bytes], bytes]) -> byte
         return replace(packet, body=change(packet.body)) if number == frame else packet
 
     return with_packets(data, change_packet)
-
-
-def test_bodies_flipped_and_cut_behind_repaired_checks() -> None:
-    data = live(frames(13))
-    for frame in range(13):
-        for at in range(1, 160, 8):
-            for change in (
-                lambda body, at=at: flip_bit(body, at // 8 % len(body), at % 8) if body else b"x",
-                lambda body, at=at: body[: at % max(1, len(body))] if body else b"\0",
-            ):
-                bad = with_body(data, frame, change)
-                for how in (False, True):
-                    with suppress(mcz.MczError):
-                        use(bad, salvage=how)
-                with pytest.raises(mcz.MczError):
-                    list(live_frames(io.BytesIO(bad)))
 
 
 def test_a_lost_end_packet_costs_no_frame() -> None:

@@ -133,11 +133,6 @@ def test_what_follows_a_protected_file_is_protected(archive: bytes, shapes: list
         assert sum(size for b in range(shape.n_blocks) for _, size in shape.pieces(b)) == shape.size
 
 
-def test_a_file_that_is_as_it_was_comes_back(archive: bytes, tmp_path: Path) -> None:
-    report, data = restore_file(archive, tmp_path)
-    assert (report.restored, report.damage, data) == (True, [], archive)
-
-
 @settings(max_examples=amount(80, 20), deadline=None, suppress_health_check=SHARED)
 @given(st.data())
 def test_bad_bytes_wherever_they_lie(
@@ -387,10 +382,6 @@ def test_the_vectors_are_repaired(damaged: Path, tmp_path: Path) -> None:
     sound = VECTORS / "valid" / "recovery" / f"{damaged.stem.rpartition('-')[0]}.mcz"
     report, data = restore_file(damaged.read_bytes(), tmp_path)
     assert (report.restored, data) == (True, sound.read_bytes())
-
-
-def test_there_are_damaged_vectors() -> None:
-    assert len(DAMAGED) == 9
 
 
 # What lies behind, and what is not its own -----------------------------------------

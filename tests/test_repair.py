@@ -97,17 +97,6 @@ def test_nothing_whole_is_an_error(archive: bytes, tmp_path: Path) -> None:
     assert not (tmp_path / "out.mcz").exists()
 
 
-def test_the_damaged_file_is_never_overwritten(archive: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "takes.mcz"
-    path.write_bytes(archive[:-9])
-    (tmp_path / "link.mcz").symlink_to(path)
-    with pytest.raises(
-        mcz.OptionError, match="the output is the damaged file itself; name another output"
-    ):
-        mcz.repair(path, tmp_path / "link.mcz", force=True)
-    assert path.read_bytes() == archive[:-9]
-
-
 def test_commands_say_what_is_whole(
     archive: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -93,21 +93,6 @@ def test_a_plain_c3d_names_the_groups_that_it_has_not(folder: Path, call: Call) 
     assert "left out: parameters of MANUFACTURERS_" in err
 
 
-def test_nothing_is_overwritten(folder: Path, call: Call) -> None:
-    (folder / "x.trc").write_bytes(b"mine")
-    words = ("convert", folder / "walk.c3d", folder / "x.trc")
-    code, _, err = call(*words)
-    assert (
-        code == 2
-        and "already exists; use --force" in err
-        and (folder / "x.trc").read_bytes() == b"mine"
-    )
-    assert call(*words, "--force")[0] == 0 and (folder / "x.trc").read_bytes() != b"mine"
-    data = (folder / "walk.bvh").read_bytes()
-    code, _, err = call("convert", folder / "walk.bvh", folder / "walk.bvh", "--force")
-    assert code == 2 and "the input itself" in err and (folder / "walk.bvh").read_bytes() == data
-
-
 def test_the_skeleton_is_an_input(folder: Path, call: Call) -> None:
     """Forcing never overwrites a file that was read for a source, its ASF included."""
     data = (folder / "walk.asf").read_bytes()

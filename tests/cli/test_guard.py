@@ -59,51 +59,6 @@ def test_encode_keeps_its_source(folder: Path, call: Call) -> None:
         mcz.encode(source, source.as_uri(), force=True)
 
 
-def test_encode_keeps_the_skeleton(folder: Path, call: Call) -> None:
-    asf = folder / "walk.asf"
-    before = asf.read_bytes()
-    for options in ((), ("--skeleton", asf)):  # found, or given
-        code, _, errors = call("encode", folder / "walk.amc", "-o", asf, "--force", *options)
-        assert code == 2
-        assert "the output is the input itself" in errors
-    assert asf.read_bytes() == before
-    assert not list(folder.glob("*.part"))
-
-
-def test_encode_keeps_the_file_of_a_parameter(folder: Path, call: Call) -> None:
-    basis = folder / "b.basis"
-    words = ("encode", folder / "walk.c3d", "--codec", "lsdt-clip", "--param", f"basis={basis}")
-    assert call("train", folder / "walk.c3d", "-o", basis, "--iterations", 1)[0] == 0
-    before = basis.read_bytes()
-    code, _, errors = call(*words, "-o", basis, "--force")
-    assert (code, "the output is the input itself" in errors) == (2, True)
-    assert basis.read_bytes() == before
-
-
-def test_other_commands_keep_their_input(archive_path: Path, folder: Path, call: Call) -> None:
-    before = archive_path.read_bytes()
-    link = folder / "link.mcz"
-    link.symlink_to(archive_path)
-    for target in (archive_path, link):
-        for words in (
-            ("decode", archive_path, "--clip", "walk.bvh", "--to", "csv", "-o", target, "--force"),
-            ("decode", archive_path, "--clip", "walk.bvh", "--to", "bvh", "-o", target, "--force"),
-            ("extract", archive_path, target, "--clip", "walk", "--force"),
-            ("append", target, archive_path, "--verbatim"),
-            ("repair", archive_path, "-o", target, "--force"),
-            ("train", archive_path, "-o", target, "--force"),
-        ):
-            code, out, errors = call(*words)
-            assert (code, out, errors.count("\n")) == (2, "", 1), words
-            said = (
-                "the output is the damaged file itself; name another output"
-                if words[0] == "repair"
-                else "the output is the input itself"
-            )
-            assert said in errors
-    assert archive_path.read_bytes() == before
-
-
 def test_append_keeps_its_target(archive_path: Path, folder: Path) -> None:
     with pytest.raises(OptionError, match="the input itself"):
         mcz.append([archive_path], archive_path, verbatim=True)

@@ -17,7 +17,7 @@ from mcz.codecs.coding.fast.encoder import StreamBuilder
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.model.numbers import Grid
 from tests.codecs.coders import CODERS, GRIDS, Coder, columns
-from tests.motions import motions, smooth
+from tests.motions import smooth
 
 EVERY = pytest.mark.parametrize("coder", CODERS, ids=lambda coder: coder.name)
 GRID = pytest.mark.parametrize("grid", GRIDS, ids=lambda g: f"{g.kind.name}-{g.digits}")
@@ -46,17 +46,6 @@ def test_extreme_ordinals_of_any_form(coder: Coder, extreme: int) -> None:
     wanted = np.array([[extreme], [5], [extreme], [-9]], np.int64)
     for grid in GRIDS:
         assert coder.rows(coder.encode_columns(wanted, grid), 4, 1, grid) == wanted.tolist()
-
-
-@pytest.mark.parametrize("codec", ["raw", "fast", "best"])
-@given(motion=motions())
-def test_any_motion_comes_back(codec: str, motion: mcz.Motion) -> None:
-    out = io.BytesIO()
-    mcz.write(motion, out, codec=codec, segment_frames=5)
-    with mcz.open(out.getvalue()) as file:
-        back = file.clips[motion.name].motion()
-    for one, other in zip(motion.signals, back.signals, strict=True):
-        np.testing.assert_array_equal(one.values, other.values)
 
 
 @pytest.mark.parametrize("grid", [GRIDS[0], GRIDS[3], GRIDS[8], GRIDS[11]], ids=repr)

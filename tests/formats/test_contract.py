@@ -25,6 +25,7 @@ from tests.formats.tab_files import storage_files, trc_files
 from tests.formats.text_files import AMC, ASF, ASF_OF_ALL_KINDS, BVH, amc_texts, bvh_texts
 from tools.vectors.build.array_files import floats, npy, plain_npz
 from tools.vectors.build.mvnx_files import MvnxFile
+from tools.vectors.build.pickle_files import joblib_file
 from tools.vectors.build.table_files import (
     COLUMNS,
     DEVICES,
@@ -83,8 +84,20 @@ def saved_array(array: Any) -> bytes:
     return buffer.getvalue()
 
 
-def pickled(array: Any) -> bytes:
-    return pickle.dumps({"walk": array, "fps": 30}, 4)
+def pickled(array: Any, protocol: int = 4) -> bytes:
+    return pickle.dumps({"walk": array, "fps": 30}, protocol)
+
+
+STRUCTURES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | arrays(),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.text(max_size=3), inner, max_size=4)
+        | st.tuples(inner, inner)
+    ),
+    max_leaves=8,
+)
+PICKLES = (pickled(floats(4, 3)), pickled(floats(4, 3), 5), joblib_file({"a": floats(4, 2)}))
 
 
 TABLES = (MOTIVE, EULER, VICON, DEVICES, ODD_SECTIONS, COLUMNS)
@@ -100,7 +113,7 @@ CASES = {
     "csv": Case("csv", TABLES, motive_files() | vicon_files() | column_files(), step=17),
     "mvnx": Case("mvnx", (MVNX,), mvnx_files(), step=29),
     "npy": Case("npy", (npy(floats(4, 3)),), arrays().map(saved_array)),
-    "pickle": Case("pickle", (pickled(floats(4, 3)),), arrays().map(pickled)),
+    "pickle": Case("pickle", PICKLES, st.builds(pickled, STRUCTURES, st.integers(0, 5)), step=3),
     "npz": Case("npz", (plain_npz({"a": floats(3, 2)}), save_npz(a=floats(2, 2))), archives()),
 }
 REFUSING = (

@@ -9,14 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import mcz
 from mcz.model.motion import Motion
 from mcz.sources import FORMATS, likely_formats
 from mcz.sources.sample import bvh_walk
-from tests.formats.mvnx_files import mvnx_files
 from tools.vectors.build.mvnx_files import MvnxFile
 
 FILE = MvnxFile()
@@ -151,19 +148,6 @@ def test_only_an_mvnx_is_written() -> None:
         FORMATS["mvnx"].write(bvh_walk())
 
 
-@given(mvnx_files())
-def test_any_file_comes_back(data: bytes) -> None:
-    back(data)
-
-
-@given(mvnx_files(), st.data())
-def test_damage_is_refused_or_comes_back(data: bytes, draw: st.DataObject) -> None:
-    at = draw.draw(st.integers(0, len(data) - 1))
-    size = draw.draw(st.integers(0, 3))
-    damaged = data[:at] + draw.draw(st.binary(max_size=3)) + data[at + size :]
-    back_or_refused(damaged)
-
-
 def back_or_refused(data: bytes) -> str:
     """The refusal, or "" for a file that comes back."""
     try:
@@ -172,15 +156,6 @@ def back_or_refused(data: bytes) -> str:
         assert "\n" not in str(error)
         return str(error)
     return ""
-
-
-def test_every_prefix() -> None:
-    last = TEXT.index(b"</frame>", TEXT.index(b'type="normal"')) + len(b"</frame>")
-    small = replace(FILE, n_frames=1, elements=("position", "orientation"), attributes=("time",))
-    text = small.text()
-    last = text.rindex(b"</frame>") + len(b"</frame>")
-    for size in range(len(text)):
-        assert bool(back_or_refused(text[:size])) == (size < last), size
 
 
 def test_a_frame_that_is_cut_off_is_kept_as_text() -> None:

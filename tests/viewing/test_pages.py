@@ -184,18 +184,6 @@ def test_a_page_that_is_too_large_is_not_written(samples: Path, tmp_path: Path, 
     assert [path.name for path in tmp_path.iterdir()] == ["x.html"]
 
 
-def test_an_input_is_no_page(samples: Path, tmp_path: Path, call: Call) -> None:
-    shutil.copy(samples / "walk.bvh", tmp_path)
-    before = (tmp_path / "walk.bvh").read_bytes()
-    (tmp_path / "walk.html").symlink_to("walk.bvh")
-    code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / "walk.html", "--force")
-    assert (code, "the output is the input itself" in errors) == (2, True)
-    for other in ("walk.bvh", "walk.mp4"):
-        code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / other, "--force")
-        assert (code, "a page must be an .html" in errors) == (2, True)
-    assert (tmp_path / "walk.bvh").read_bytes() == before
-
-
 @pytest.mark.parametrize(
     "name", ["</script><script>alert(1)</script>", "<!--<script>", "]]>", "\u2028\u0000&lt;"]
 )
