@@ -73,8 +73,8 @@ if TYPE_CHECKING:
     from mcz.files.writing.file import encode, to_npz, write
     from mcz.hints import Hint
     from mcz.kinematics.contacts import Contact, Contacts, contacts
-    from mcz.kinematics.marker_motion import in_positions
     from mcz.kinematics.metrics import Comparison, compare
+    from mcz.kinematics.points import in_positions
     from mcz.kinematics.poses import (
         Root,
         accelerations,
@@ -89,9 +89,8 @@ if TYPE_CHECKING:
     from mcz.kinematics.rest_pose import rest_positions
     from mcz.kinematics.retargeting.joint_maps import joint_map
     from mcz.kinematics.retargeting.mirroring import mirror
-    from mcz.kinematics.retargeting.renaming import rename, with_offsets
     from mcz.kinematics.retargeting.retargeting import retarget
-    from mcz.kinematics.retargeting.selection import select
+    from mcz.kinematics.retargeting.selection import rename, select, with_offsets
     from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
     from mcz.show.pictures.plotting import Plotted, plot
     from mcz.show.pictures.rendering import Rendered, render
@@ -160,7 +159,7 @@ _HOMES = {
     "mcz.files.reading.source_info": ("recording",),
     "mcz.files.writing.file": ("encode", "to_npz", "write"),
     "mcz.files.reading.post_filtering": ("post_filter",),
-    "mcz.kinematics.marker_motion": ("in_positions",),
+    "mcz.kinematics.points": ("in_positions",),
     "mcz.files.live.writer": ("LiveWriter",),
     "mcz.kinematics.poses": (
         "Root",
@@ -195,9 +194,8 @@ _HOMES = {
     "mcz.sources.c3d.recording": ("Event", "ForcePlatform", "Recording"),
     "mcz.kinematics.retargeting.joint_maps": ("joint_map",),
     "mcz.kinematics.retargeting.mirroring": ("mirror",),
-    "mcz.kinematics.retargeting.renaming": ("rename", "with_offsets"),
     "mcz.kinematics.retargeting.retargeting": ("retarget",),
-    "mcz.kinematics.retargeting.selection": ("select",),
+    "mcz.kinematics.retargeting.selection": ("rename", "select", "with_offsets"),
     "mcz.files.live.generators": ("LiveReader", "live_frames", "stream_decode", "stream_encode"),
     "mcz.files.live.reader_with_losses": ("StreamSummary",),
     "mcz.show.viewing.view": ("View", "view"),

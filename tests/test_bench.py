@@ -17,11 +17,11 @@ from scipy.interpolate import PchipInterpolator
 
 import mcz
 from mcz import Motion, OptionError
-from mcz.bench import bjontegaard, ladder, peers, report, tasks
-from mcz.bench.bjontegaard import bd_rate, bd_sqnr
+from mcz.bench import peers, report, sweep, tasks
 from mcz.bench.cases import Case, Variant, find_cases, load, preset_of, variants_of
-from mcz.bench.measure import cpu_seconds, measure, peak_bytes, speeds
+from mcz.bench.measure import Settings, cpu_seconds, ladder, measure, peak_bytes, speeds
 from mcz.bench.report import bench
+from mcz.bench.sweep import bd_rate, bd_sqnr
 from mcz.bench.tables import Table
 from mcz.bench.tasks import KINDS, Runner, Task, perform
 from mcz.cli.common import run as run_command
@@ -66,7 +66,7 @@ def test_the_interpolation_is_that_of_scipy(steps: list[float], seed: int) -> No
     y = np.cumsum(np.random.default_rng(seed).uniform(0.01, 10, len(x)))
     low, high = x[0] + 0.1 * (x[-1] - x[0]), x[-1] - 0.2 * (x[-1] - x[0])
     wanted = PchipInterpolator(x, y).integrate(low, high)
-    assert bjontegaard._integral(x, y, low, high) == pytest.approx(float(wanted), rel=1e-9)
+    assert sweep._integral(x, y, low, high) == pytest.approx(float(wanted), rel=1e-9)
 
 
 def test_sqnr_is_that_of_the_definition() -> None:
@@ -89,7 +89,7 @@ def test_a_ladder_has_evenly_spaced_sizes(rises: bool, whole: bool) -> None:
     def size(setting: float) -> float:
         return 50.0 * setting**0.5 if rises else 50_000.0 / setting**0.5
 
-    found = ladder.ladder(size, ladder.Settings(dial), (10_000.0, 1_000.0), 8)
+    found = ladder(size, Settings(dial), (10_000.0, 1_000.0), 8)
     sizes = [size(setting) for setting in found]
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[0] == pytest.approx(10_000, rel=0.2)
@@ -100,26 +100,26 @@ def test_a_ladder_has_evenly_spaced_sizes(rises: bool, whole: bool) -> None:
 
 
 def test_a_ladder_ends_where_the_dial_or_the_codec_does() -> None:
-    settings = ladder.Settings(Dial("q", 2.0**-20, 2.0**20))
+    settings = Settings(Dial("q", 2.0**-20, 2.0**20))
 
     def size(setting: float) -> float:
         if setting > 100:
             raise OptionError("too coarse")
         return 5_000.0 / max(setting, 0.5)
 
-    found = ladder.ladder(size, settings, (1e6, 1.0), 6)
+    found = ladder(size, settings, (1e6, 1.0), 6)
     assert size(found[0]) == 10_000
     assert 50 <= size(found[-1]) <= 100
-    assert ladder.ladder(lambda setting: 7.0, settings, (100.0, 10.0), 6) != []
+    assert ladder(lambda setting: 7.0, settings, (100.0, 10.0), 6) != []
 
 
 def test_a_dial_that_does_little_at_first_is_followed() -> None:
-    settings = ladder.Settings(Dial("a", 0.25, 2.0**20, rises=True))
+    settings = Settings(Dial("a", 0.25, 2.0**20, rises=True))
 
     def size(setting: float) -> float:
         return 300.0 + 6 * math.sin(setting) if setting < 20 else 15.0 * setting
 
-    found = ladder.ladder(size, settings, (20_000.0, 800.0), 8)
+    found = ladder(size, settings, (20_000.0, 800.0), 8)
     assert len(found) == 8
     assert 15_000 < size(found[0]) < 25_000
 

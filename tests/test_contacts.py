@@ -25,7 +25,7 @@ from mcz import (
     contacts,
 )
 from mcz.kinematics.contacts import find_runs, frames_in, speeds
-from mcz.kinematics.joint_groups import is_foot
+from mcz.kinematics.joint_names import is_foot
 from tests.motions import POSITIONS
 
 FEET = (

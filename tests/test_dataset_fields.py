@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 import mcz
-from mcz.exchange.datasets.statistics import _moments_of
+from mcz.exchange.datasets.feature_blocks import _moments_of
 from tests.motions import rich, smooth
 
 Make = Callable[[mcz.Motion], mcz.Dataset]
@@ -175,7 +175,7 @@ def test_statistics_are_kept_in_a_folder(
     kept = {"cache": "5 MB", "folder": tmp_path / "kept"}
     first = data_of(robot(), fields="joint_pos,root", **kept).statistics()
     (tmp_path / "0.mcz").rename(tmp_path / "moved.mcz")
-    monkeypatch.setattr("mcz.exchange.datasets.statistics._compute", None)
+    monkeypatch.setattr("mcz.exchange.datasets.feature_blocks._compute", None)
     again = mcz.dataset(tmp_path / "moved.mcz", "joint_pos,root", dtype="float64", **kept)
     for name, each in again.statistics().items():
         np.testing.assert_array_equal(each.mean, first[name].mean)

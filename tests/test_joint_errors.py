@@ -12,7 +12,7 @@ import pytest
 import mcz
 from mcz import MotionError
 from mcz.kinematics import origins_of
-from mcz.kinematics.metrics.joint_errors import joint_errors
+from mcz.kinematics.metrics.diff_document import joint_errors
 from tests.commands import run
 
 

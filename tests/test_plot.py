@@ -22,7 +22,7 @@ import mcz
 from mcz import MczError, Motion, MotionError, OptionError, plot
 from mcz.files.reading.report import info
 from mcz.files.reading.sizes import byte_shares, layout
-from mcz.kinematics.metrics.joint_errors import joint_errors
+from mcz.kinematics.metrics.diff_document import joint_errors
 from mcz.show.pictures.channel_charts import density
 from mcz.show.pictures.charts import MOST_POINTS, STYLE, ChartPage, Sheet, number, thin_line
 from mcz.show.pictures.error_charts import errors_between

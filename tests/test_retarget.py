@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics import origins_of, reach, shell_points_of
-from mcz.kinematics.joint_groups import find_feet
+from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.retargeting.joint_maps import SKELETONS, SMPL_BODY
-from mcz.kinematics.retargeting.rest_poses import _least_turn
 from mcz.kinematics.retargeting.retargeting import size_ratio
+from mcz.kinematics.retargeting.turns import _least_turn
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth
 from tests.skeletons import VECTORS, skeletons, values_for

@@ -14,7 +14,7 @@ import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.exchange.conversion import converted_files
 from mcz.kinematics.angles import Unwrapper, unwrap
-from mcz.kinematics.metrics.joint_errors import joint_errors
+from mcz.kinematics.metrics.diff_document import joint_errors
 from mcz.kinematics.rotations import (
     continuous,
     matrices_of_vectors,

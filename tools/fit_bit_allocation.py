@@ -13,8 +13,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 
-from mcz.bench.bjontegaard import bd_rate, bd_sqnr
 from mcz.bench.cases import Case, find_cases
+from mcz.bench.sweep import bd_rate, bd_sqnr
 from mcz.errors import MczError
 from tools.papers.kwak.clips import (
     BVH_POINTS,

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import mcz
-from mcz.bench import ladder, measure, peers
+from mcz.bench import measure, peers
 from mcz.bench.cases import Case, Variant, load, reason_of_failure
 from mcz.codecs import codec_by_name
 from mcz.errors import MczError, SkeletonWarning
@@ -52,7 +52,7 @@ class Task:
 
 
 def _sweep(task: Task) -> Any:
-    return ladder.sweep(task.case, task.variant, *task.arguments)
+    return measure.sweep(task.case, task.variant, *task.arguments)
 
 
 def _point(task: Task) -> Any:
@@ -202,7 +202,7 @@ class Runner:
 
 
 # Of this folder; no measured figure depends on a file of cli/.
-MEASURING = ("cases.py", "ladder.py", "measure.py", "peers.py", "tasks.py")
+MEASURING = ("cases.py", "measure.py", "peers.py", "tasks.py")
 
 
 def default_folder() -> Path:

@@ -13,7 +13,7 @@ import numpy as np
 
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
-from mcz.kinematics.joint_groups import find_feet
+from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.points import first_points, positions_of
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.skeleton import column_of, signs_of
@@ -62,7 +62,7 @@ class Contacts:
 
     ``joints`` are the examined joints, as ``Skeleton.addresses`` names them. ``up_axis`` is "x" to
     "-z", and ``up_guessed`` where the skeleton does not state it; ``rate_assumed`` where
-    ``frame_rate`` is 120 because no rate is known. Raises MotionError where a run is of another
+    ``frame_rate`` is 120 because no rate is known. Raises MotionError if a run is of another
     joint or beyond the frames.
     """
 
@@ -85,7 +85,7 @@ class Contacts:
     def frames(self, joint: str) -> Bools:
         """Contact state of ``joint`` in every frame, bool (n_frames,).
 
-        Raises MotionError where that joint was not examined.
+        Raises MotionError if that joint was not examined.
         """
         if joint not in self.joints:
             known = ", ".join(self.joints)
@@ -107,8 +107,8 @@ def contacts(
     unknown is guessed, and marked in the result. Where a position is unknown, there is no contact.
     Each part between two breaks in time is examined separately.
 
-    Raises MotionError where there is no such joint, no foot by name or no kinematics, and
-    OptionError where the length unit is unknown.
+    Raises MotionError if there is no such joint, no foot by name or no kinematics, and
+    OptionError if the length unit is unknown.
     """
     skeleton, signal = motion.skeleton, motion.signals[0]
     if not signal.has_poses:
@@ -218,7 +218,7 @@ def _means(points: Floats) -> Floats:
 
 
 def lowest_height(track: Floats, up: int, rule: ContactRule = RULE) -> float | None:
-    """The height of a point at its lowest, None where it is never known."""
+    """The height of a point at its lowest, None if it is never known."""
     known: Bools = np.asarray(np.isfinite(track).all(axis=1))
     return float(np.percentile(track[known, up], rule.floor)) if known.any() else None
 
@@ -228,7 +228,7 @@ def find_runs(
 ) -> Iterator[tuple[int, int]]:
     """First frame and number of frames of every contact of one point.
 
-    ``track`` has its positions in cm, float64 (n_frames, 3), NaN where unknown; ``up`` is the
+    ``track`` has its positions in cm, float64 (n_frames, 3), NaN if unknown; ``up`` is the
     column of the up axis, ``rate`` in frames a second, ``floor`` a ``lowest_height``; None: the one
     of this track.
     """
@@ -249,7 +249,7 @@ def find_runs(
 def speeds(track: Floats, rate: float, window: float) -> Floats:
     """The speed of a point, from its positions half a ``window`` before and after, in units/s.
 
-    ``track`` is (n_frames, 3); the result (n_frames,), NaN where one of the positions is unknown.
+    ``track`` is (n_frames, 3); the result (n_frames,), NaN if one of the positions is unknown.
     """
     half = min(max(1, frames_in(window / 2, rate)), len(track))
     frames = np.arange(len(track))

@@ -3,10 +3,10 @@
 There is no exact answer: the solution has the least sum of squared distances and, among equals, the
 values nearest to rest and to the neighbor frames. All frames are solved together:
 
-1. an initial pose from the roots down (``initial_pose.py``),
+1. an initial pose from the roots down (``targets.InitialPose``),
 2. damped Gauss-Newton steps (Levenberg, Marquardt),
 3. a restart of frames that end far off or stand out,
-4. where distances remain, smoothing of values that the positions hardly determine.
+4. if distances remain, smoothing of values that the positions hardly determine.
 
 The cost per frame is constant; large arrays exist for a block of frames only.
 mcz/kinematics/README.md explains the choices.
@@ -19,10 +19,9 @@ from typing import Any
 import numpy as np
 
 from mcz.errors import MotionError
-from mcz.kinematics.initial_pose import InitialPose
 from mcz.kinematics.rotation_fit import center_angles, smallest_angles
 from mcz.kinematics.rotations import ORDERS, continuous, nearest_solutions
-from mcz.kinematics.targets import Targets
+from mcz.kinematics.targets import InitialPose, Targets
 from mcz.model.motion import Skeleton
 from mcz.model.types import Bools, Floats, Ints
 
@@ -51,7 +50,7 @@ def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) 
     length unit, as ``positions_of`` returns them, ``markers`` those of its virtual markers if
     known. NaN is an unknown position. Channels that move no target are 0.
 
-    Raises MotionError where the shapes do not match the skeleton, and where it has no kinematics;
+    Raises MotionError if the shapes do not match the skeleton, and where it has no kinematics;
     OptionError for virtual markers without a length unit.
     """
     targets = Targets(skeleton, markers=markers is not None)
@@ -208,7 +207,7 @@ def _between(jumps: Ints, n_frames: int) -> Bools:
 def _targets_seen(
     targets: Targets, points: Floats, markers: Floats | None
 ) -> tuple[Floats, Floats]:
-    """(positions (n_targets, 3, F), 0 where unknown; 1.0 where known, else 0.0, (n_targets, F))."""
+    """(positions (n_targets, 3, F), 0 if unknown; 1.0 if known, else 0.0, (n_targets, F))."""
     skeleton = targets.skeleton
     n_markers = 0 if markers is None else 3 * skeleton.n_joints
     shapes = {"points": (points, len(targets) - n_markers), "virtual markers": (markers, n_markers)}

@@ -1,8 +1,13 @@
-"""Points: which ones a skeleton has, their names, and their positions over time."""
+"""Points of a skeleton: names, positions over time, and motions of a marker at each of them.
+
+SPEC.md, "Kinematics", defines the points; its section "Positions" defines the fields of a clip of
+markers. ``mcz/exchange/conversion/marker_fit.py`` is the inverse.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +15,7 @@ import numpy as np
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics.chain import Chain, Pose, chain_of, multiply_matrices
-from mcz.model.motion import POSITION_KINDS, Joint, Motion, Skeleton
+from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.types import Floats
 
 MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
@@ -33,7 +38,7 @@ def positions(motion: Motion) -> Floats:
     """Positions of the points of ``motion``, float64 (n_frames, n_points, 3), in length units.
 
     ``point_names`` lists these points. A point that depends on an invalid value is NaN. Raises
-    MotionError where the skeleton has no kinematics: its angle unit is unknown, or all of its
+    MotionError if the skeleton has no kinematics: its angle unit is unknown, or all of its
     channels are plain scalars.
     """
     if not motion.signals[0].has_poses:
@@ -62,7 +67,7 @@ def virtual_markers_of(skeleton: Skeleton, values: Floats) -> Floats:
     """Three markers a joint, 3 cm off its point along its local axes x, y and z.
 
     float64 (n_frames, 3 n_joints, 3) in length units. A joint's point is the first of its points.
-    Raises OptionError where the length unit is unknown, otherwise as ``positions``.
+    Raises OptionError if the length unit is unknown, otherwise as ``positions``.
     """
     return _Positions(skeleton, values, markers=True).markers
 
@@ -71,7 +76,7 @@ def shell_points_of(skeleton: Skeleton, values: Floats, radius_cm: float = SHELL
     """Three points a joint, ``radius_cm`` off its origin along the axes that turn with it.
 
     float64 (n_frames, 3 n_joints, 3) in length units. In the rest pose these axes are the world's
-    axes, independent of ``axis``. Raises OptionError where the length unit is unknown, otherwise as
+    axes, independent of ``axis``. Raises OptionError if the length unit is unknown, otherwise as
     ``positions``.
     """
     return _Positions(skeleton, values, shell_cm=radius_cm).shell
@@ -162,7 +167,7 @@ def check_radius(radius_cm: float) -> None:
 
 
 def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
-    """``radius_cm`` in length units; OptionError where the unit is unknown."""
+    """``radius_cm`` in length units; OptionError if the unit is unknown."""
     check_radius(radius_cm)
     if skeleton.unit_cm is None:
         raise OptionError(
@@ -241,7 +246,7 @@ def first_points(skeleton: Skeleton) -> list[int]:
 def depths(skeleton: Skeleton) -> Floats:
     """Relative depth of each joint, 0 for roots to 1 for the deepest, (n_joints,).
 
-    All 0 where no joint has a parent. Joints without channels count as well.
+    All 0 if no joint has a parent. Joints without channels count as well.
     """
     steps = np.zeros(skeleton.n_joints)
     for index, joint in enumerate(skeleton.joints):
@@ -267,3 +272,94 @@ def reach(skeleton: Skeleton) -> float:
             for end in (origin, *(origin + np.array(tail) for tail in joint.tails)):
                 greatest = max(greatest, float(np.sqrt(end @ end)))
     return greatest
+
+
+NOTE = "positions by forward kinematics"  # the source-note of a computed motion begins with it
+SEPARATOR = "; "
+
+
+def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
+    """Markers at the points of ``motion``; with ``virtual_markers`` three more for every joint.
+
+    The markers have the length unit and up axis of the skeleton. ``skeleton.base`` is not set: the
+    writer sets it. There is no source, since it could not be restored. An unknown position is 0
+    under a mask. A motion of markers is returned unchanged.
+
+    Raises MotionError if the skeleton has no kinematics, OptionError for virtual markers where
+    its length unit is unknown.
+    """
+    skeleton, first = motion.skeleton, motion.signals[0]
+    if point_set(skeleton) == "markers":
+        return motion
+    if not first.has_poses:
+        raise MotionError(
+            "the channels of its motion signal differ from those of its skeleton", clip=motion.name
+        )
+    values = np.asarray(motion.values, np.float64)
+    positions = marker_values(skeleton, values, virtual_markers=virtual_markers)
+    valid = ~np.isnan(positions)
+    signal = Signal(
+        np.where(valid, positions, 0.0),
+        name=first.name,
+        samples_per_frame=first.samples_per_frame,
+        mask=None if valid.all() else valid,
+    )
+    markers = replace(
+        motion,
+        skeleton=marker_skeleton(skeleton, virtual_markers=virtual_markers),
+        signals=(signal, *motion.signals[1:]),
+        metadata=dict(motion.metadata) | {"source-note": _note(motion)},
+        source=None,
+    )
+    return markers.at_times(motion.timeline)
+
+
+def marker_skeleton(
+    skeleton: Skeleton, base: bytes | None = None, *, virtual_markers: bool = False
+) -> Skeleton:
+    """A marker for each point of ``skeleton``, whose id is ``base``, then its virtual markers."""
+    names = list(point_names(skeleton))
+    if virtual_markers:
+        names += virtual_marker_names(skeleton)
+    channels = tuple(map(Channel, POSITION_KINDS))
+    return Skeleton(
+        tuple(Joint(name, channels=channels) for name in names),
+        skeleton.name,
+        skeleton.unit_cm,
+        "",
+        skeleton.up_axis,
+        skeleton.forward_axis,
+        skeleton.handedness,
+        base=base,
+    )
+
+
+def marker_values(skeleton: Skeleton, values: Floats, *, virtual_markers: bool = False) -> Floats:
+    """The values of ``marker_skeleton``, (n_frames, n_channels), NaN if a position is unknown.
+
+    ``values`` are the values of ``skeleton``, (n_frames, its channels). Raises as ``in_positions``.
+    """
+    if virtual_markers:
+        positions = np.concatenate(points_and_markers_of(skeleton, values), axis=1)
+    else:
+        positions = positions_of(skeleton, values)
+    return positions.reshape(len(positions), 3 * positions.shape[1])
+
+
+def virtual_marker_names(skeleton: Skeleton) -> list[str]:
+    """The names of the virtual markers of a skeleton, in order: ``JOINT+x``, ``JOINT+y``, ..."""
+    return [f"{address}+{axis}" for address in skeleton.addresses() for axis in "xyz"]
+
+
+def _note(motion: Motion) -> str:
+    note = NOTE if motion.source is None else f"{NOTE} of {motion.source.format.upper()}"
+    return SEPARATOR.join(filter(None, [note, motion.metadata.get("source-note")]))
+
+
+def without_note(motion: Motion) -> dict[str, str]:
+    """The metadata of ``motion`` without the note that ``in_positions`` adds."""
+    metadata = dict(motion.metadata)
+    note = metadata.pop("source-note", "")
+    if note.startswith(NOTE):
+        note = note.partition(SEPARATOR)[2]
+    return metadata | ({"source-note": note} if note else {})

@@ -7,7 +7,7 @@ from decimal import ROUND_HALF_UP, Decimal
 
 import numpy as np
 
-from mcz.kinematics.joint_groups import find_feet
+from mcz.kinematics.joint_names import find_feet
 from mcz.model.motion import POSITION_KINDS, Skeleton
 from mcz.model.types import Floats
 

@@ -19,8 +19,7 @@ import numpy as np
 
 import mcz
 from mcz.bench.cases import Case, Variant
-from mcz.bench.ladder import sweep
-from mcz.bench.measure import measure, write_file
+from mcz.bench.measure import measure, sweep, write_file
 from mcz.files.reading.sizes import clip_sizes
 from tools.figures.lossless import cpu_seconds, read_values
 from tools.figures.table import Table, table

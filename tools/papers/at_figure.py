@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from mcz.bench.cases import Case, Variant
-from mcz.bench.ladder import MOST_TRIALS, Settings, dial_of
-from mcz.bench.measure import Record, measure
+from mcz.bench.measure import MOST_TRIALS, Record, Settings, dial_of, measure
 from mcz.errors import MotionError, OptionError
 
 NEAR, CLOSE = 0.002, 1.0005  # of a figure, and of settings: near enough

@@ -20,7 +20,6 @@ import numpy as np
 
 import mcz
 from mcz.bench.cases import Case, Loaded, Variant, load
-from mcz.bench.ladder import dial_of
 from mcz.bench.measure import (
     LEAST_SECONDS,
     MOST_RUNS,
@@ -28,6 +27,7 @@ from mcz.bench.measure import (
     codec_calls,
     coded_part,
     cpu_seconds,
+    dial_of,
     write_file,
 )
 from mcz.codecs import codec_by_name

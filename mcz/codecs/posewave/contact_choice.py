@@ -28,7 +28,7 @@ from mcz.codecs.segments import skeleton_of
 from mcz.codecs.source_readers import FrameReader
 from mcz.errors import OptionError
 from mcz.kinematics.contacts import USUAL_RATE, FootTracks
-from mcz.kinematics.joint_groups import find_feet
+from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.points import points_of, positions_of
 from mcz.model.indexing import merged_ranges
 from mcz.model.motion import Skeleton

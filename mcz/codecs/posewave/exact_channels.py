@@ -23,7 +23,7 @@ from mcz.codecs.posewave.header import (
 )
 from mcz.codecs.segments import gather
 from mcz.errors import FormatError, OptionError
-from mcz.kinematics.joint_groups import find_joints
+from mcz.kinematics.joint_names import find_joints
 from mcz.model.motion import Skeleton
 from mcz.model.schema import parse
 from mcz.model.types import Ints, Params

@@ -12,7 +12,7 @@ from mcz.errors import MotionError
 from mcz.exchange.conversion.hierarchy import PRINTED
 from mcz.kinematics import point_names, point_set, points_and_markers_of, positions, positions_of
 from mcz.kinematics.inverse import solve_ik
-from mcz.kinematics.marker_motion import without_note
+from mcz.kinematics.points import without_note
 from mcz.kinematics.targets import unsolved_channels
 from mcz.model.motion import Motion, Signal, Skeleton
 from mcz.model.text_format import brief
@@ -165,7 +165,7 @@ def _fit(
 
 
 def _distances(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distances between points (n_frames, n, 3), NaN where one is unknown."""
+    """Distances between points (n_frames, n, 3), NaN if one is unknown."""
     step = a - b
     distances: NDArray[np.float64] = np.sqrt((step * step).sum(axis=2))
     return distances

@@ -7,9 +7,9 @@ counts, cuts, shuffles and splits.
 
 from __future__ import annotations
 
+from mcz.exchange.datasets.feature_blocks import FieldStatistics
 from mcz.exchange.datasets.humanml import humanml3d, humanml3d_positions
 from mcz.exchange.datasets.member_list import dataset
-from mcz.exchange.datasets.statistics import FieldStatistics
 from mcz.exchange.datasets.windows import Dataset, Window
 
 __all__ = [

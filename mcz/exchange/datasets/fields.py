@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import first_points
 from mcz.kinematics.frames import FramePoses
-from mcz.kinematics.joint_groups import find_feet
+from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.poses.trajectories import point_names
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import joint_columns

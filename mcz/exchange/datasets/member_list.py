@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mcz.errors import MczError, OptionError
-from mcz.exchange.datasets.blocks import Settings
 from mcz.exchange.datasets.caches import to_size
+from mcz.exchange.datasets.feature_blocks import Settings
 from mcz.exchange.datasets.fields import SignalShape, Units, names_of
 from mcz.exchange.datasets.sources import MOST_OPEN, Member, Recipe, recipe_of
 from mcz.exchange.datasets.windows import Dataset
@@ -62,7 +62,7 @@ def dataset(
     root, rot6d, quat, rotvec, matrix, heading, foot_speed, contacts, humanml3d and more, or the
     name of any signal; docs/guides/datasets.md has their shapes. ``rate``: all are resampled to it,
     exactly where every n-th frame will do; ``source_rate`` is that of clips that do not say theirs.
-    ``window`` frames each, every ``stride`` (as many, where None); None: whole clips. ``where``
+    ``window`` frames each, every ``stride`` (as many, if None); None: whole clips. ``where``
     chooses clips: an expression as in ``File.find``, or a function of a Clip. ``joints`` and
     ``unit`` as in ``positions``; ``up`` is the up axis of skeletons that do not state it.
     ``normalize``: see ``Dataset.normalized``.
@@ -70,8 +70,8 @@ def dataset(
 
     Where frames are missing, the parts between are clips of their own, so that no window spans a
     gap, unless ``across_gaps``. Clips too short for a window are listed in ``Dataset.skipped``.
-    Raises OptionError where clips do not go together: other joints, rates or units; MotionError and
-    FormatError where one cannot be used.
+    Raises OptionError if clips do not go together: other joints, rates or units; MotionError and
+    FormatError if one cannot be used.
     """
     recipe = _recipe(fields, rate, joints, Units(unit, up), dtype)
     window, stride = _cut(window, stride)
@@ -206,7 +206,7 @@ class _Agreement:
         self._known: set[tuple[object, ...]] = set()
 
     def check(self, clip: Clip, member: Member) -> None:
-        """Raises OptionError where ``clip`` differs from the first."""
+        """Raises OptionError if ``clip`` differs from the first."""
         key = member.target, *self._recipe.subject_key(clip, member)
         if key in self._known:
             return

@@ -16,9 +16,8 @@ import numpy as np
 from mcz.container.caches import DecodedCache, SharedCache
 from mcz.errors import OptionError
 from mcz.exchange.datasets.caches import Arrays
-from mcz.exchange.datasets.field_table import SIGNAL, parse_fields
+from mcz.exchange.datasets.field_table import SIGNAL, parse_fields, subject_of
 from mcz.exchange.datasets.fields import WHOLE, Field, Rows, Subject, Units, features_of
-from mcz.exchange.datasets.subjects import subject_of
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.kinematics.chain import Floats
@@ -115,7 +114,7 @@ class Sources:
             file.container.runs = SharedCache(self._runs, target)
 
     def clip(self, member: Member) -> Clip:
-        """Raises as ``mcz.open`` does, and OptionError where the clip is gone."""
+        """Raises as ``mcz.open`` does, and OptionError if the clip is gone."""
         with self._lock:
             file = self._given.get(member.target) or self._open.get(member.target)
             if file is None:

@@ -12,11 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import OptionError, OutOfRangeError
-from mcz.exchange.datasets.blocks import BLOCK, Blocks, Settings
+from mcz.exchange.datasets.feature_blocks import (
+    BLOCK,
+    Blocks,
+    FieldStatistics,
+    Settings,
+    statistics_of,
+)
 from mcz.exchange.datasets.fields import Subject, names_of
 from mcz.exchange.datasets.samplers import EPOCH, SEED, SIZE, WindowBatchSampler, WindowSampler
 from mcz.exchange.datasets.sources import Member
-from mcz.exchange.datasets.statistics import FieldStatistics, statistics_of
 from mcz.files.reading.file import File
 from mcz.kinematics.poses.conversions import continuous_signs
 from mcz.model.indexing import row_numbers
@@ -108,7 +113,7 @@ class Dataset:
 
     @property
     def rate(self) -> Fraction | None:
-        """Frames a second, None where the clips do not say it."""
+        """Frames a second, None if the clips do not say it."""
         first = self.members[0].source_rate if self.members else None
         return self._settings.recipe.rate or first
 
@@ -225,7 +230,7 @@ class Dataset:
         """The same windows less the mean of each field, divided by the standard deviation.
 
         ``statistics`` of another data set, the training part, say, or by default the own ones.
-        Raises OptionError where they lack a field.
+        Raises OptionError if they lack a field.
         """
         scales = dict(self.statistics() if statistics is None else statistics)
         missing = [name for name in self.fields if name not in scales]
@@ -341,7 +346,7 @@ class Dataset:
         near to these as whole subjects allow, each at least one. ``by``: a key of the clips'
         metadata, or "clip", of which each stands for itself; ``pattern``: a regular expression
         whose first group, found in the name of a clip, is its subject instead. The same ``seed``
-        splits the same clips in the same way. Raises OptionError where a clip has none, and where
+        splits the same clips in the same way. Raises OptionError if a clip has none, and where
         there are fewer subjects than parts.
         """
         from mcz.exchange.datasets.samplers import split
@@ -361,7 +366,7 @@ class Dataset:
     def torch(self) -> Any:
         """As a ``torch.utils.data.Dataset``, an item a dict of tensors, (window, ...).
 
-        Raises OptionError where PyTorch is not installed (``mcz[torch]``).
+        Raises OptionError if PyTorch is not installed (``mcz[torch]``).
         """
         try:
             from mcz.exchange.datasets.torch_dataset import TorchDataset

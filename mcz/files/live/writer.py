@@ -38,7 +38,7 @@ from mcz.files.writing.planning import (
 from mcz.files.writing.quality import CHUNK, RunningFigures, quality_payload, texts_of
 from mcz.files.writing.signal_source import MemorySource
 from mcz.kinematics.frames import FramePositions
-from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
+from mcz.kinematics.points import NOTE, SEPARATOR, marker_skeleton
 from mcz.model.motion import Motion, Signal, Skeleton
 from mcz.model.text_format import brief
 from mcz.model.types import Floats, Params

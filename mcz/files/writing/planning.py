@@ -21,7 +21,7 @@ from mcz.files.reading.source_info import stating_rate
 from mcz.files.writing.signal_bounds import of_codec
 from mcz.files.writing.signal_source import MemorySource, as_stored, group_kind, settle
 from mcz.kinematics import point_set
-from mcz.kinematics.marker_motion import in_positions
+from mcz.kinematics.points import in_positions
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.clock import TIMES
 from mcz.model.motion import ROLES, Motion, Signal, Skeleton, Source

@@ -14,7 +14,7 @@ import numpy as np
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.kinematics import point_names, point_set
-from mcz.kinematics.joint_groups import find_feet
+from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.metrics import compare
 from mcz.kinematics.metrics.sums import channel_errors
 from mcz.model.motion import Exceptions, Motion, Signal, Skeleton

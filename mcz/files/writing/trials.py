@@ -27,7 +27,7 @@ from mcz.files.writing.planning import Prepared
 from mcz.files.writing.quality import with_values
 from mcz.files.writing.signal_bounds import MEAN_ERROR
 from mcz.kinematics import positions_of
-from mcz.kinematics.joint_groups import find_joints
+from mcz.kinematics.joint_names import find_joints
 from mcz.kinematics.metrics import Comparison, compare
 from mcz.kinematics.metrics.sums import channel_errors
 from mcz.model.motion import Motion

@@ -7,7 +7,6 @@ agree between machines to about 1e-9, not to the last bit.
 from __future__ import annotations
 
 from mcz.kinematics.metrics.comparison import compare
-from mcz.kinematics.metrics.figures import Comparison, JointFigures
-from mcz.kinematics.metrics.sliding import ContactSlide, Sliding
+from mcz.kinematics.metrics.figures import Comparison, ContactSlide, JointFigures, Sliding
 
 __all__ = ["Comparison", "ContactSlide", "JointFigures", "Sliding", "compare"]

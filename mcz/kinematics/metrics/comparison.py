@@ -1,4 +1,4 @@
-"""Two motions, read side by side in blocks of frames, and the figures of one against the other."""
+"""Comparison of two motions in blocks of frames; differences that prevent a figure become notes."""
 
 from __future__ import annotations
 
@@ -6,22 +6,20 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mcz.errors import MotionError
+from mcz.errors import MczError, MotionError
 from mcz.hints import Hint, Remark
-from mcz.kinematics import SHELL_CM, Places, places_of, point_names, point_set, points_of
-from mcz.kinematics.contacts import Contacts, FootTracks
-from mcz.kinematics.joint_groups import find_feet
-from mcz.kinematics.metrics.comparability import (
-    common_unit,
-    frames_text,
-    has_markers_of,
-    rows_of,
-    same_axes,
-    same_channels,
-    same_points,
+from mcz.kinematics import (
+    SHELL_CM,
+    Places,
+    places_of,
+    point_names,
+    point_set,
+    points_of,
+    positions_of,
 )
-from mcz.kinematics.metrics.figures import Comparison, JointFigures
-from mcz.kinematics.metrics.sliding import Sliding, sliding
+from mcz.kinematics.contacts import Contacts, FootTracks
+from mcz.kinematics.joint_names import find_feet
+from mcz.kinematics.metrics.figures import Comparison, JointFigures, Sliding, sliding
 from mcz.kinematics.metrics.sums import (
     ChangeErrors,
     ChannelErrors,
@@ -32,8 +30,117 @@ from mcz.kinematics.metrics.sums import (
     scale_figure,
 )
 from mcz.kinematics.points import check_radius
-from mcz.model.motion import Motion, Signal, Skeleton
+from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
+from mcz.model.motion import POSITION_KINDS, Motion, Signal, Skeleton
 from mcz.model.types import Floats
+
+
+def frames_text(signal: Signal) -> str:
+    rate = signal.samples_per_frame
+    return f"{signal.n_frames} frames" + (f" of {rate} rows" if rate > 1 else "")
+
+
+def common_unit(a: Skeleton, b: Skeleton, notes: list[str]) -> tuple[Number, float]:
+    """Unit of distances in cm, and the factor from lengths of ``b`` to it."""
+    if a.unit_cm is not None and b.unit_cm is not None:
+        return a.unit_cm, b.unit_cm / a.unit_cm
+    if a.unit_cm is None and b.unit_cm is None:
+        notes.append(Remark("the length unit is unknown: no figures in cm", Hint.UNIT))
+    else:
+        notes.append(
+            Remark(
+                "one side does not state its length unit; that of the other is used, "
+                "and there are no figures in cm",
+                Hint.UNIT,
+            )
+        )
+    return None, 1.0
+
+
+def _kinds(motion: Motion) -> list[tuple[str, str]]:
+    own = motion.signals[0].channels
+    return [(c.kind, c.name) for c in (motion.skeleton.channels if own is None else own)]
+
+
+def same_channels(original: Motion, decoded: Motion, notes: list[str]) -> bool:
+    a, b = original.skeleton, decoded.skeleton
+    kinds, decoded_kinds = _kinds(original), _kinds(decoded)
+    units = a.unit_cm, b.unit_cm
+    has_lengths = any(kind in {*POSITION_KINDS, "length"} for kind, _ in kinds)
+    difference = None
+    if kinds != decoded_kinds:
+        difference = f"other channels ({len(kinds)} and {len(decoded_kinds)})"
+    elif a.angle_unit != b.angle_unit:
+        difference = f"angles in {a.angle_unit or '?'} and {b.angle_unit or '?'}"
+    elif has_lengths and None not in units and units[0] != units[1]:
+        difference = f"units of {units[0]:.6g} and {units[1]:.6g} cm"
+    if difference:
+        notes.append(f"{difference}: no errors of channels")
+    return difference is None
+
+
+def same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
+    """Return True if both have kinematics and the same number of points."""
+    counts = []
+    for motion in (original, decoded):
+        signal, skeleton = motion.signals[0], motion.skeleton
+        try:
+            if not signal.has_poses:
+                raise MotionError("its channels differ from those of the skeleton")
+            positions_of(skeleton, rows_of(signal, 0, min(1, signal.n_frames)))
+            counts.append(len(point_names(skeleton)))
+        except MczError as error:
+            notes.append(f"no positions of {motion.name!r}: {error}")
+            return False
+    is_same = counts[0] == counts[1] or has_markers_of(original.skeleton, decoded.skeleton)
+    if not (is_same and counts[0]):
+        sets = f"{point_set(original.skeleton)}, {point_set(decoded.skeleton)}"
+        notes.append(f"{counts[0]} and {counts[1]} points ({sets}): no errors of positions")
+        return False
+    without = [m for m in (original, decoded) if has_no_lengths(m.skeleton)]
+    if len(without) == 1:
+        notes.append(f"{without[0].name!r}: {NO_LENGTHS}, unlike on the other side: no positions")
+        return False
+    pairs = zip(point_names(original.skeleton), point_names(decoded.skeleton), strict=False)
+    apart = [pair for pair in pairs if pair[0] != pair[1]]
+    if apart:
+        first = " and ".join(map(repr, apart[0]))
+        notes.append(
+            f"points are compared in order; {len(apart)} of {counts[0]} have other "
+            f"names on the other side, first {first}"
+        )
+    return True
+
+
+def same_axes(a: Skeleton, b: Skeleton, notes: list[str]) -> bool:
+    """Return True if both have the same number of joints with axes: turning ones or markers.
+
+    Also if the other has virtual markers as markers.
+    """
+    if has_markers_of(a, b):
+        return True
+    sets = point_set(a), point_set(b)
+    if "markers" in sets and sets[0] != sets[1]:
+        notes.append(f"points of {sets[0]} and {sets[1]}: no errors of virtual markers and shells")
+        return False
+    if a.n_joints != b.n_joints:
+        counts = f"{a.n_joints} and {b.n_joints} joints"
+        notes.append(f"{counts}: no errors of virtual markers and shells")
+        return False
+    return True
+
+
+def has_markers_of(a: Skeleton, b: Skeleton) -> bool:
+    """Return True if ``b`` has the points of ``a``, then its virtual markers."""
+    if point_set(b) != "markers" or point_set(a) == "markers":
+        return False
+    return b.n_joints == len(point_names(a)) + 3 * a.n_joints
+
+
+def rows_of(signal: Signal, start: int, stop: int) -> Floats:
+    """Frames start <= f < stop as binary64, NaN if invalid."""
+    return signal.cut(start, stop).masked().astype(np.float64, copy=False)
+
 
 BLOCK = 2**19  # numbers a block, which bounds the memory
 
@@ -54,7 +161,7 @@ def compare(
     name) name them, ``Contacts`` give their runs. Figures that do not apply to the two motions
     (different channels or points) are None, with a note.
 
-    Raises MotionError where the two differ in frames or in rows a frame, or lack a joint in
+    Raises MotionError if the two differ in frames or in rows a frame, or lack a joint in
     ``contacts``, and OptionError for a bad ``shell_cm``.
     """
     a, b = original.signals[0], decoded.signals[0]
@@ -80,8 +187,9 @@ def compare(
             if has_same_points:
                 errors.add(start, left, right)
         further = _further_signals(original, decoded, notes)
-    velocities, accelerations = (errors.velocities(unit), errors.accelerations(unit))
     points, markers, shell = errors.points, errors.markers, errors.shell
+    velocities = errors.derivative_errors(errors.changes.velocity, unit, 1)
+    accelerations = errors.derivative_errors(errors.changes.acceleration, unit, 2)
     return Comparison(
         frames=a.n_frames,
         channels=a.n_channels if has_same_channels else None,
@@ -186,7 +294,7 @@ class PositionErrors:
     def enable(
         self, virtual_markers: bool, shell_cm: float | None, contacts: Feet, notes: list[str]
     ) -> None:
-        """Enable figures that the options ask for, where both sides have them; units are known."""
+        """Enable figures that the options request, if both sides have them; units are known."""
         a, b = self._a, self._b
         if (virtual_markers or shell_cm is not None) and same_axes(a, b, notes):
             if virtual_markers:
@@ -254,23 +362,18 @@ class PositionErrors:
         return self._where(self.shell, self._a.addresses())
 
     def _where(self, errors: Distances, names: Sequence[str]) -> tuple[int, str] | None:
-        where = errors.where
-        if where is None:
+        if errors.where is None:
             return None
-        return where[0] // self._original.signals[0].samples_per_frame, names[where[1]]
+        row, point = errors.where
+        return self._frame(row), names[point]
 
-    def _frame(self, row: int | None) -> int | None:
-        return None if row is None else row // self._original.signals[0].samples_per_frame
+    def _frame(self, row: int) -> int:
+        return row // self._original.signals[0].samples_per_frame
 
-    def velocities(self, unit: Number) -> tuple[Number, Number]:
-        """Mean and greatest error of velocities in cm/s, ``unit`` cm a length unit."""
-        return self._scaled_errors(self.changes.velocity, unit, 1)
-
-    def accelerations(self, unit: Number) -> tuple[Number, Number]:
-        """Mean and greatest error of accelerations in cm/s2, ``unit`` cm a length unit."""
-        return self._scaled_errors(self.changes.acceleration, unit, 2)
-
-    def _scaled_errors(self, errors: Distances, unit: Number, order: int) -> tuple[Number, Number]:
+    def derivative_errors(
+        self, errors: Distances, unit: Number, order: int
+    ) -> tuple[Number, Number]:
+        """Mean and greatest error in cm/s (order 1) or cm/s2 (2), ``unit`` cm a length unit."""
         rate = self._original.frame_rate or self._decoded.frame_rate
         if unit is None or rate is None:
             return None, None
@@ -305,10 +408,10 @@ class PositionErrors:
                 unit_cm=unit,
                 mean_position_error=mean,
                 max_position_error=most,
-                frame=self._frame(row),
+                frame=None if row is None else self._frame(row),
                 shell_mean_cm=scale_figure(shell_mean, unit),
                 shell_max_cm=scale_figure(shell_most, unit),
-                shell_frame=self._frame(shell_row),
+                shell_frame=None if shell_row is None else self._frame(shell_row),
             )
             for name, size, (mean, most, row), (shell_mean, shell_most, shell_row) in zip(
                 names, sizes, points, shells, strict=True

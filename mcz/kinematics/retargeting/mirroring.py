@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics.retargeting.matching import check_channels, replace_motion
-from mcz.kinematics.retargeting.sides import counterparts
+from mcz.kinematics.joint_names import counterparts
+from mcz.kinematics.retargeting.joint_maps import check_channels, replace_motion
 from mcz.model.motion import (
     POSITION_KINDS,
     TURNING_KINDS,

@@ -16,9 +16,9 @@ import numpy as np
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import origins_of, point_set, reach
 from mcz.kinematics.chain import IDENTITY, Chain, multiply_matrices, to_world
-from mcz.kinematics.joint_groups import is_foot
+from mcz.kinematics.joint_names import is_foot
 from mcz.kinematics.rest_pose import rest_positions
-from mcz.kinematics.retargeting.matching import (
+from mcz.kinematics.retargeting.joint_maps import (
     check_channels,
     computed_signal,
     is_moving,
@@ -26,13 +26,14 @@ from mcz.kinematics.retargeting.matching import (
     nearest_above,
     replace_motion,
 )
-from mcz.kinematics.retargeting.rest_poses import rest_turns, usual_alike
 from mcz.kinematics.retargeting.turns import (
     finite_frames,
     inverse,
     local_turns,
     relative_turns,
+    rest_turns,
     set_local_turns,
+    usual_alike,
 )
 from mcz.kinematics.targets import Targets
 from mcz.model.motion import POSITION_KINDS, Motion, Skeleton
@@ -70,7 +71,7 @@ def retarget(
 
     Raises OptionError for unknown joints, for two with one counterpart, for one of ``match_rest``
     without a bone, for up axes that differ, for a scale that is not above 0, and if no joint could
-    follow the root's path. Raises MotionError where one of the skeletons has no kinematics or
+    follow the root's path. Raises MotionError if one of the skeletons has no kinematics or
     markers alone.
     """
     check_channels(motion)
@@ -125,7 +126,7 @@ class _Retargeted:
         self.travel = Travel(source, target, pairs, scale, values, origins_of(source, values))
 
     def values(self) -> Floats:
-        """Values (n_frames, n_channels), NaN where their source is unknown."""
+        """Values (n_frames, n_channels), NaN if their source is unknown."""
         # rotations still missing, along the joint's own axes
         missed: dict[int, Floats] = {-1: IDENTITY}
         for joint, other in self.pairs.items():
@@ -257,7 +258,7 @@ class Travel:
     def _carrier(self, joint: int, other: int) -> int:
         """The joint whose position channels move ``joint``: itself or the nearest above it.
 
-        -1 where none has any, and none is needed. Raises OptionError.
+        -1 if none has any, and none is needed. Raises OptionError.
         """
         carrier = joint
         while carrier >= 0 and not is_moving(self.target.joints[carrier].channels):

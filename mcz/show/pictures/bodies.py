@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.kinematics.chain import Floats
-from mcz.kinematics.frames import FramePoses, frame_poses_of
-from mcz.kinematics.joint_groups import find_feet
+from mcz.kinematics.frames import FramePoses, MotionLike, frame_poses_of, values_of
+from mcz.kinematics.joint_names import find_feet, sides_of
 from mcz.kinematics.points import listed_points, point_set
-from mcz.kinematics.poses.motion_like import MotionLike, values_of
-from mcz.kinematics.retargeting.sides import sides_of
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import signs_of
 from mcz.model.types import Ints

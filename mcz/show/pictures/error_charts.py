@@ -12,7 +12,7 @@ from mcz.errors import MczError, MotionError
 from mcz.kinematics import origins_of, positions_of
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.metrics import compare
-from mcz.kinematics.metrics.joint_errors import joint_errors, pairs_of
+from mcz.kinematics.metrics.diff_document import joint_errors, pairs_of
 from mcz.kinematics.metrics.sums import Distances, scale_figure
 from mcz.model.motion import Motion
 from mcz.model.types import Settings

@@ -14,7 +14,7 @@ import numpy as np
 
 import mcz
 from mcz.kinematics.chain import Chain, Pose, multiply_matrices
-from mcz.kinematics.retargeting.sides import sides_of
+from mcz.kinematics.joint_names import sides_of
 
 from .spaces import TO_Z_UP, Floats, blender_names, continuous, to_quaternions
 

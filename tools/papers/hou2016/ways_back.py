@@ -14,7 +14,7 @@ from mcz.errors import MotionError
 from mcz.exchange.conversion import from_positions
 from mcz.files.reading.sizes import clip_sizes
 from mcz.kinematics.chain import chain_of
-from mcz.kinematics.marker_motion import in_positions
+from mcz.kinematics.points import in_positions
 from mcz.model.motion import ROTATION_KINDS, Motion, Skeleton
 
 Floats = NDArray[np.float64]

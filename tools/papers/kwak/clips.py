@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import mcz
 from mcz.bench.cases import Case, find_cases
 from mcz.errors import MczError, OptionError
-from mcz.kinematics.marker_motion import in_positions
+from mcz.kinematics.points import in_positions
 from mcz.model.motion import Motion, Signal
 
 Floats = NDArray[np.float64]

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz.bench.cases import Loaded, Variant, load
-from mcz.bench.ladder import dial_of
-from mcz.bench.measure import Record, codec_calls, cpu_seconds, write_file
+from mcz.bench.measure import Record, codec_calls, cpu_seconds, dial_of, write_file
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_finder
 from mcz.codecs.online.units import Unit, parse_units

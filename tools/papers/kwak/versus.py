@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mcz.bench.bjontegaard import bd_rate, bd_sqnr
 from mcz.bench.measure import Record
+from mcz.bench.sweep import bd_rate, bd_sqnr
 from tools.papers.kwak.clips import POINTS, VIRTUAL, Clip
 from tools.papers.kwak.tasks import MARKER_RATES, Found, Method, marker_task
 

@@ -22,8 +22,8 @@ from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, multiply_matrices
 from mcz.kinematics.frames import frame_poses_of
+from mcz.kinematics.joint_names import sides_of
 from mcz.kinematics.poses.conversions import from_matrices
-from mcz.kinematics.retargeting.sides import sides_of
 from mcz.model.clock import Timeline
 from mcz.model.motion import TURNING_KINDS, Motion, check_poses
 from mcz.model.types import Ints
@@ -41,7 +41,7 @@ class Node:
     ``parent`` is an index of nodes, -1: none. ``rest`` (3,) is its offset at rest from its parent.
     ``turns`` (n_frames, 4) are unit quaternions, x y z w, from its parent, neighbors near each
     other; None: never turned. ``shifts`` (n_frames, 3) is its offset from its parent; None: at
-    ``rest``. ``places`` (n_frames, 3) is its position in the world, NaN where unknown. ``side`` is
+    ``rest``. ``places`` (n_frames, 3) is its position in the world, NaN if unknown. ``side`` is
     "left", "right" or "" by its name.
     """
 
