@@ -96,8 +96,8 @@ if TYPE_CHECKING:
     from mcz.show.pictures.rendering import Rendered, render
     from mcz.show.rerun import to_rerun
     from mcz.show.viewing.view import View, view
+    from mcz.sources.arrays.array_files import split_clips
     from mcz.sources.arrays.body_models import offsets_from_positions, offsets_of_model
-    from mcz.sources.arrays.libraries import split_clips
     from mcz.sources.arrays.skeletons import body_skeleton
     from mcz.sources.c3d.recording import Event, ForcePlatform, Recording
 
@@ -189,7 +189,7 @@ _HOMES = {
     "mcz.files.reading.source_files": ("read_skeleton",),
     "mcz.kinematics.rest_pose": ("rest_positions",),
     "mcz.sources.arrays.body_models": ("offsets_from_positions", "offsets_of_model"),
-    "mcz.sources.arrays.libraries": ("split_clips",),
+    "mcz.sources.arrays.array_files": ("split_clips",),
     "mcz.sources.arrays.skeletons": ("body_skeleton",),
     "mcz.sources.c3d.recording": ("Event", "ForcePlatform", "Recording"),
     "mcz.kinematics.retargeting.joint_maps": ("joint_map",),

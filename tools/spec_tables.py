@@ -51,7 +51,6 @@ MODULES = (
     "mcz.sources.tables.layout",
     "mcz.sources.arrays.layout",
     "mcz.sources.arrays.deflate",
-    "mcz.sources.text.notes",
     "mcz.sources.tables.source",
     "mcz.sources.c3d.layout",
     "mcz.container.recovery",

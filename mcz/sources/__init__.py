@@ -48,14 +48,14 @@ class Format:
     ``read(data, name)`` gives a Motion, a Skeleton where ``is_skeleton``, and takes the Skeleton or
     None as a third argument where ``wants_skeleton``; it raises SourceError. ``write`` is its
     inverse; it raises MotionError or FormatError. ``join_notes`` is the inverse of the notes' cut.
-    ``arrive(lines, skeleton)`` reads what comes line by line, None where the format cannot.
+    ``arrive(lines, skeleton)`` reads what comes line by line, None if the format cannot.
     ``bones(data, whole=False)``: of a format that wants a skeleton, how many values each bone of
     the first frame, or of all, has. ``has_more_joints(data, most)`` says after a quick look whether
-    a file surely has more, None where nobody can. ``states_rate``: the template holds the frame
+    a file surely has more, None if nobody can. ``states_rate``: the template holds the frame
     rate, so that it does not suit another; ``restate(template, rate)`` gives that rate and a
     template that states another one, see ``stated_rates``. ``is_table``: its header names every
     column, which is much of what is written. ``recording(name, template, detail)`` is what the
-    source says beside all numbers, None where it says nothing; see ``mcz.Recording``.
+    source says beside all numbers, None if it says nothing; see ``mcz.Recording``.
     ``arrays(source, signals)`` lists what became of the arrays of a file that has some.
     ``is_motion(data)`` says of a suffix that others use, too, whether a file that begins so seems
     to be of this format.
@@ -106,7 +106,7 @@ FORMATS: dict[str, Format] = {
             (".amc",),
             _of("text.amc", "read"),
             _of("text.amc", "write"),
-            _of("text.notes", "join_notes"),
+            _of("text.layout", "join_notes"),
             wants_skeleton=True,
             arrive=_of("text.amc", "arrive"),
             bones=_of("text.amc", "bones"),
@@ -117,7 +117,7 @@ FORMATS: dict[str, Format] = {
             (".bvh",),
             _of("text.bvh", "read"),
             _of("text.bvh", "write"),
-            _of("text.notes", "join_notes"),
+            _of("text.layout", "join_notes"),
             states_rate=True,
             arrive=_of("text.bvh", "arrive"),
             has_more_joints=_of("text.hierarchy", "has_more_joints"),
@@ -176,15 +176,15 @@ FORMATS: dict[str, Format] = {
                 name,
                 format_id,
                 (f".{name}",),
-                _of("arrays.read", f"read_{name}"),
-                _of("arrays.read", "write_arrays"),
+                _of("arrays.array_files", f"read_{name}"),
+                _of("arrays.array_files", "write_arrays"),
                 states_rate=name == "npz",
                 is_motion=_of(*is_motion),
                 arrays=_of("arrays.pickles" if name == "npy" else "arrays.layout", "list_arrays"),
             )
             for format_id, name, is_motion in (
                 (12, "npy", ("arrays.pickles", "is_npy_motion")),
-                (13, "npz", ("arrays.header", "is_motion")),
+                (13, "npz", ("arrays.columns", "is_motion")),
             )
         ),
         *(
@@ -192,8 +192,8 @@ FORMATS: dict[str, Format] = {
                 name,
                 format_id,
                 suffixes,
-                _of("arrays.read", read),
-                _of("arrays.read", "write_arrays"),
+                _of("arrays.array_files", read),
+                _of("arrays.array_files", "write_arrays"),
                 states_rate=True,
                 is_motion=_of("arrays.pickles", is_motion),
                 arrays=_of("arrays.pickles", "list_arrays"),
@@ -266,7 +266,7 @@ def likely_formats(data: bytes) -> tuple[str, ...]:
         return ("c3d",)
     if re.match(rb"PATHFILETYPE[ \t]", start):
         return ("trc",)
-    if start.startswith(b"<") and _of("tables.mvnx_header", "is_mvnx")(head):
+    if start.startswith(b"<") and _of("tables.mvnx", "is_mvnx")(head):
         return ("mvnx",)
     small = head.lower()
     # words first: an expression anchored to lines is far slower
@@ -294,7 +294,7 @@ def recording_of(source: Source | None) -> Any:
 
 
 def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | None:
-    """``source``, a C3D, with other scales of analog channels; None where it states none."""
+    """``source``, a C3D, with other scales of analog channels; None if it states none."""
     found: Source | None = _of("c3d.recording", "with_analog_scales")(source, scales)
     return found
 

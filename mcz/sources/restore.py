@@ -24,8 +24,7 @@ from mcz.model.numbers.tokens import TENS
 from mcz.model.numbers.values import print_rules
 from mcz.model.types import Floats, Ints, Values
 from mcz.sources.text import Items
-from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, parse_layout
-from mcz.sources.text.notes import RowNotes
+from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, RowNotes, parse_layout
 from mcz.sources.text.rows import MAX_NUMBER
 
 TEXT_LIMIT = 2**26  # bytes that any text may have
@@ -41,7 +40,7 @@ def restore(motion: Motion, source: Source) -> bytes:
     Rows after the last note use pattern 0. A value that its grid does not have is printed as the
     nearest number of the grid.
 
-    Raises FormatError where the source does not belong to such a motion, and LimitError for a text
+    Raises FormatError if the source does not belong to such a motion, and LimitError for a text
     that is larger than the limits above.
     """
     signal = motion.signals[0]
@@ -84,7 +83,7 @@ def write_rows(
     """Write all rows and what follows them; ``signal`` has the columns of the patterns.
 
     ``numbers`` are the frame numbers of the rows. ``missing``: what stands where the signal is
-    invalid, None where that does not matter. Raises as ``restore`` does.
+    invalid, None if that does not matter. Raises as ``restore`` does.
     """
     runs = pattern_runs(layout, notes, signal.n_rows)
     texts: list[tuple[int, bytes]] = []

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton
 from mcz.sources.c3d import c3d
-from mcz.sources.c3d.outputs import Split
+from mcz.sources.c3d.parameters import Split
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, make_c3d
 
 ORDERS = (INTEL, DEC, SGI)

@@ -1,4 +1,7 @@
 """NPY and NPZ: arrays as NumPy saves them, read and written byte for byte without NumPy's loader.
 
-Nothing is unpickled here. SPEC.md, "Template of arrays", is normative.
+``array_files`` reads and writes files, ``meaning`` decides what arrays mean, ``columns`` has their
+numbers, ``layout`` all other bytes. Nothing is unpickled here.
+
+SPEC.md, "Template of arrays", is normative.
 """

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from mcz.errors import AccessError, OptionError, SourceError, reason_of
 from mcz.model.motion import Motion, Source
 from mcz.model.types import Items
-from mcz.sources.arrays.header import MAGIC
+from mcz.sources.arrays.columns import MAGIC
 from mcz.sources.arrays.layout import members_of, parse_arrays
 from mcz.sources.arrays.meaning import SHAPE
 from mcz.sources.arrays.skeletons import has_tree, tree
@@ -118,9 +118,9 @@ def offsets_from_positions(
 
     ``positions`` (n_frames, n_joints, 3); ``rotations`` (n_frames, n_joints, 3, 3), matrices of
     each joint's turn from its parent; ``parents`` of each joint, -1 of a root. Offsets are in the
-    unit of the positions. That of a root is from ``translations`` (n_frames, 3) to it, or 0 where
+    unit of the positions. That of a root is from ``translations`` (n_frames, 3) to it, or 0 if
     there are none: then the root's positions are its translations. Frames in which a number is
-    not finite do not count. Raises OptionError where shapes do not match, or nothing is known.
+    not finite do not count. Raises OptionError if shapes do not match, or nothing is known.
     """
     places, turns = np.asarray(positions, np.float64), np.asarray(rotations, np.float64)
     shape = len(places), len(parents), 3
@@ -156,7 +156,7 @@ def offsets_from_positions(
 
 
 def _check_tree(file: Path, parents: list[int], n_joints: int) -> None:
-    """Raises OptionError where the model's joints are others than those of so many."""
+    """Raises OptionError if the model's joints are others than those of so many."""
     if not has_tree(n_joints):
         return
     body = tree(n_joints)
@@ -267,7 +267,7 @@ def with_model(motion: Motion, model: str | os.PathLike[str]) -> Motion:
     ``model`` is a file as of ``mcz.offsets_of_model``; "{gender}" in it stands for the gender that
     the take states, "{body}" for smpl, smplh or smplx. Numbers and source stay as they are. A
     motion of anything else is returned as it is. Raises what ``offsets_of_model`` does, and
-    OptionError where no gender is stated.
+    OptionError if no gender is stated.
     """
     skeleton, source = motion.skeleton, motion.source
     if source is None or source.format != "npz" or not has_tree(skeleton.n_joints):
@@ -308,7 +308,7 @@ def _offsets(
 
 
 def _betas(source: Source) -> tuple[float, ...] | None:
-    """The numbers of ``betas``, which a file keeps beside its signals; None where it has none."""
+    """The numbers of ``betas``, which a file keeps beside its signals; None if it has none."""
     members = dict(members_of(parse_arrays(source.template, source.detail)))
     data = b"".join(piece.text for piece in members.get(SHAPE, ()))
     if MAGIC not in data:

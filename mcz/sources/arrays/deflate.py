@@ -26,7 +26,7 @@ from mcz.sources.arrays.deflate_codes import (
     STORED,
     Codes,
 )
-from mcz.sources.arrays.deflate_search import WINDOW, Effort, Search
+from mcz.sources.arrays.deflate_kernels import WINDOW, Effort, Search
 
 LEVELS = {  # parameters of zlib's search, by its levels
     1: Effort(4, 4, 8, 4, 1),
@@ -116,7 +116,7 @@ def is_kept(part: bytes) -> bool:
 def restore_stream(part: bytes, contents: bytes) -> bytes:
     """The deflate stream of ``contents``, of stored blocks where they are not as they were.
 
-    Raises FormatError where ``part`` does not make one.
+    Raises FormatError if ``part`` does not make one.
     """
     described = parse(Deflated, part, "source detail")
     _check(described)
@@ -175,7 +175,7 @@ def _split(
 
 
 def _join(described: Deflated, contents: bytes) -> bytes:
-    """The stream of ``contents``; raises FormatError where they do not make one."""
+    """The stream of ``contents``; raises FormatError if they do not make one."""
     stops = np.cumsum([len(block.codes) for block in described.blocks], dtype=np.int64)
     blocks = np.zeros((len(stops), 4), np.int64)
     for row, block in zip(blocks, described.blocks, strict=True):

@@ -18,18 +18,20 @@ from mcz.model.clock import times_fault
 from mcz.model.motion import Channel, Joint, Skeleton
 from mcz.model.types import Items
 from mcz.sources.arrays.columns import Array
-from mcz.sources.arrays.robot_arrays import (
+from mcz.sources.arrays.skeletons import (
     BODIES,
     BODY_NAMES,
     JOINT_NAMES,
     JOINTS,
+    BodyTree,
     decode_text,
     is_robot,
     joint_names,
     names_of,
     robot_channels,
+    skeleton_of,
+    tree,
 )
-from mcz.sources.arrays.skeletons import BodyTree, skeleton_of, tree
 from mcz.sources.tables.times import UNITS, rate_of_times
 
 MAX_PER_FRAME = 1000  # rows a frame of an array that is longer than the motion
@@ -219,7 +221,7 @@ def rate_of(arrays: Sequence[Array], n_frames: int) -> tuple[Fraction | None, bo
 
 
 def _number(array: Array) -> tuple[float, np.dtype[np.generic]] | None:
-    """The only number of an array and its type, None where it is none of a rate."""
+    """The only number of an array and its type, None if it is none of a rate."""
     if array.words is None or array.words.size != 1:
         return None
     value = float(array.words.ravel()[0])
@@ -287,7 +289,7 @@ class Body:
 
 
 def body_of(arrays: Sequence[Array]) -> Body | None:
-    """The body that the arrays of a file speak of, None where they do not."""
+    """The body that the arrays of a file speak of, None if they do not."""
     named = {
         array.name: index
         for index, array in reversed([*enumerate(arrays)])

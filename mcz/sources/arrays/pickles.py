@@ -17,9 +17,8 @@ from mcz.errors import SourceError
 from mcz.model.motion import Source
 from mcz.model.types import JsonObject
 from mcz.sources.arrays.archive import Archive, Field, read_archive
-from mcz.sources.arrays.columns import MAX_TEXT, Array, array_of
-from mcz.sources.arrays.header import MAGIC, Head, read_head
-from mcz.sources.arrays.header import is_motion as is_array_motion
+from mcz.sources.arrays.columns import MAGIC, MAX_TEXT, Array, Head, array_of, read_head
+from mcz.sources.arrays.columns import is_motion as is_array_motion
 from mcz.sources.arrays.layout import (
     INTEGERS,
     LOCAL,

@@ -21,9 +21,8 @@ from mcz.model.motion import Motion, Signal
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Ints, Items
 from mcz.sources.arrays.archive import Archive, Member
-from mcz.sources.arrays.columns import file_columns
+from mcz.sources.arrays.columns import Head, file_columns
 from mcz.sources.arrays.deflate import describe_stream, restore_stream
-from mcz.sources.arrays.header import Head
 from mcz.sources.arrays.layout import (
     BIG_ENDIAN,
     BY_COLUMNS,
@@ -49,7 +48,7 @@ BINARY = {4: Grid(GridKind.BINARY32), 8: Grid(GridKind.BINARY64)}
 def restore_arrays(motion: Motion) -> bytes:
     """The file that the source and all signals of ``motion`` make.
 
-    Raises FormatError where the source does not belong to such a motion, and LimitError for a file
+    Raises FormatError if the source does not belong to such a motion, and LimitError for a file
     beyond the limits above.
     """
     source = motion.source
@@ -131,7 +130,7 @@ def _contents(piece: Piece, pieces: Sequence[Piece], stored: _Stored) -> bytes:
 
 
 def _size(piece: Piece, stored: _Stored) -> int:
-    """The bytes of a piece; raises FormatError where it does not fit the signals."""
+    """The bytes of a piece; raises FormatError if it does not fit the signals."""
     match piece.kind:
         case Kind.TEXT | Kind.OWN | Kind.DEFLATE:
             return len(piece.text)

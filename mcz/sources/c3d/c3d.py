@@ -20,17 +20,19 @@ from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.model.numbers.scaling import Scaling
 from mcz.model.types import Items, Values
 from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT, Kind, Layout, ordered_fields
-from mcz.sources.c3d.outputs import NAME as OUTPUTS
-from mcz.sources.c3d.outputs import Split, find_outputs, output_channels
 from mcz.sources.c3d.parameters import (
     FLOAT,
     INTEGER,
     Parameters,
+    Split,
     decode_texts,
+    find_outputs,
     find_parameters,
     names_of,
+    output_channels,
     parse_parameters,
 )
+from mcz.sources.c3d.parameters import NAME as OUTPUTS
 from mcz.sources.c3d.plain import plain
 from mcz.sources.c3d.recording import is_unsigned, recording_of
 from mcz.sources.c3d.restore import restore

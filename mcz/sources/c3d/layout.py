@@ -14,8 +14,7 @@ from construct import Int8ul
 
 from mcz.errors import FormatError, LimitError
 from mcz.model.schema import SIZED, UVARINT, Record, bounded, build, counted, field, one_of, parse
-from mcz.sources.c3d.outputs import Split, split_of
-from mcz.sources.c3d.parameters import DEC, INTEL, SGI, Order
+from mcz.sources.c3d.parameters import DEC, INTEL, SGI, Order, Split, split_of
 from mcz.sources.c3d.shape import COUNTED, ROTATION_WORDS
 
 FORMAT, OUTPUTS_FORMAT = "c3d", "c3d-outputs"  # names in the registry of source formats

@@ -18,9 +18,19 @@ from mcz.model.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.numbers.scaling import Scaling
 from mcz.sources.c3d.layout import Kind, Layout
-from mcz.sources.c3d.outputs import NAME as OUTPUTS
-from mcz.sources.c3d.outputs import UNITS_OF, Listed, describe_outputs
-from mcz.sources.c3d.parameters import BLOCK, FLOAT, INTEGER, INTEL, MAX_BLOCKS, TEXT, Order
+from mcz.sources.c3d.parameters import (
+    BLOCK,
+    FLOAT,
+    INTEGER,
+    INTEL,
+    MAX_BLOCKS,
+    TEXT,
+    UNITS_OF,
+    Listed,
+    Order,
+    describe_outputs,
+)
+from mcz.sources.c3d.parameters import NAME as OUTPUTS
 from mcz.sources.c3d.restore import field_bytes, valid_points
 from mcz.sources.c3d.shape import COUNTED, WORD_OF_FIRST, WORD_OF_LAST
 
@@ -104,7 +114,7 @@ def _analog(signal: Signal | None) -> tuple[Signal | None, Scaling | None]:
 
 
 def _residuals(placed: Sequence[Signal], n_frames: int) -> Signal:
-    """The residuals of all points: 0 where they are valid, -1 elsewhere."""
+    """The residuals of all points: 0 if they are valid, -1 elsewhere."""
     parts = []
     for signal in placed:
         valid = valid_points(_without_nan(signal))
@@ -120,7 +130,7 @@ def _residuals(placed: Sequence[Signal], n_frames: int) -> Signal:
 
 
 def _scale(placed: Sequence[Signal], others: Iterable[Signal]) -> float | None:
-    """The scale of a file of integers, None where floats are needed."""
+    """The scale of a file of integers, None if floats are needed."""
     grids = {grid for points in placed for grid in points.grids}
     if len(grids) != 1 or next(iter(grids)).kind != GridKind.SCALED:
         return None
@@ -154,7 +164,7 @@ def _without_nan(points: Signal) -> Signal:
 
 
 def _on(signal: Signal, grid: Grid) -> Signal:
-    """The signal on another grid; raises MotionError where that has no number nearby."""
+    """The signal on another grid; raises MotionError if that has no number nearby."""
     if all(own == grid for own in signal.grids) and not signal.grid_changes:
         return signal
     ordinals, _ = grid.ordinals(signal.values.astype(np.float64))
@@ -290,7 +300,7 @@ class Section:
             self.add(name if number == 1 else f"{name}{number}", kind, (len(part),), data)
 
     def close(self) -> None:
-        """End the section at the border of a block; raises MotionError where it is too long."""
+        """End the section at the border of a block; raises MotionError if it is too long."""
         self.data += b"\0\0"
         self.data += bytes(-len(self.data) % BLOCK)
         if len(self.data) > MAX_BLOCKS * BLOCK:

@@ -14,15 +14,16 @@ import numpy as np
 from mcz.model.motion import Source
 from mcz.model.numbers.scaling import Scaling
 from mcz.sources.c3d.layout import Layout, parse_layout
-from mcz.sources.c3d.outputs import groups_of, unit_of
 from mcz.sources.c3d.parameters import (
     BLOCK,
     FLOAT,
     MAX_BLOCKS,
     Parameters,
     decode_texts,
+    groups_of,
     names_of,
     parse_parameters,
+    unit_of,
 )
 
 Vector = tuple[float, float, float]
@@ -85,7 +86,7 @@ class Recording:
     and ``analog_rate`` in samples a second, "" and None while unknown. ``general_scale`` is part of
     what every analog word means. ``x_screen`` and ``y_screen`` are the axes that point right and up
     on a screen, as printed ("+X", "-Z"), "" while unknown. ``zero_frames`` are the frames, from 1
-    on, in which no platform is loaded, None where the file does not say so.
+    on, in which no platform is loaded, None if the file does not say so.
     """
 
     first_frame: int
@@ -149,7 +150,7 @@ def recording_of(layout: Layout) -> Recording:
 
 
 def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | None:
-    """``source`` with other scales of analog channels; None where it does not state theirs."""
+    """``source`` with other scales of analog channels; None if it does not state theirs."""
     layout = parse_layout(source.format, source.template, source.detail)
     parameters, head = _parameters(layout), bytearray(layout.head)
     places: list[int] = []
@@ -259,14 +260,14 @@ def _whole(number: float) -> int:
 
 
 def _dimensions(parameters: Parameters, name: str) -> tuple[int, int]:
-    """The first two dimensions of a parameter of platforms, 0 where it has none."""
+    """The first two dimensions of a parameter of platforms, 0 if it has none."""
     parameter = parameters.get("FORCE_PLATFORM", name)
     dims = (*(parameter.dims if parameter else ()), 0, 0)
     return dims[0], dims[1]
 
 
 def _item(numbers: Sequence[float], index: int, size: int) -> Sequence[float]:
-    """Item ``index`` of ``size`` numbers, empty where not all of them are there."""
+    """Item ``index`` of ``size`` numbers, empty if not all of them are there."""
     item = numbers[index * size : (index + 1) * size]
     return item if len(item) == size else []
 

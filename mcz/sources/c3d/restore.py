@@ -17,8 +17,8 @@ from mcz.model.motion import Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Items, Values
 from mcz.sources.c3d.layout import Kind, Layout, parse_layout
-from mcz.sources.c3d.outputs import NAME as OUTPUTS
 from mcz.sources.c3d.parameters import BLOCK, Order
+from mcz.sources.c3d.parameters import NAME as OUTPUTS
 from mcz.sources.c3d.shape import COUNTED, ROTATION_WORDS
 
 INTEGERS = (GridKind.SCALED, GridKind.INTEGER)
@@ -28,7 +28,7 @@ def restore(motion: Motion, source: Source) -> bytes:
     """The bytes that ``source`` and the signals of ``motion`` make.
 
     A value that its grid does not have is written as the nearest that a word can hold. Raises
-    FormatError where the source does not belong to such a motion, MotionError for a range of
+    FormatError if the source does not belong to such a motion, MotionError for a range of
     frames that the file cannot have.
     """
     layout = parse_layout(source.format, source.template, source.detail)
@@ -167,7 +167,7 @@ def _residuals(motion: Motion, layout: Layout, parts: list[Signal]) -> Signal:
 
 
 def _with_gaps(points: Signal, residuals: Values) -> Signal:
-    """The points, NaN where they are invalid and neither they nor their residuals say so.
+    """The points, NaN if they are invalid and neither they nor their residuals say so.
 
     A lossy codec fills such gaps, which the file would then no longer have.
     """

@@ -4,63 +4,253 @@ SPEC.md, "The text of tables", is normative for the way back: a frame is a row, 
 Segments have positions and orientations along the axes of the world, so each is a joint without a
 parent; its bones are tails. Every other element of numbers is a signal. Frames of calibration
 before the motion belong to the header.
+
+Expat reads the header and refuses a declaration of types where it begins: no entity is declared,
+so none is expanded, and nothing else is loaded.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from xml.parsers import expat
 
 import numpy as np
 
 from mcz.errors import MotionError, SourceError
 from mcz.model.clock import TIMES
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.model.skeleton import ORIGIN
-from mcz.sources.tables.mvnx_frames import END, TIME, FrameColumns, first_frame, read_frames
-from mcz.sources.tables.mvnx_header import Header, numbered_names, read_header
+from mcz.model.skeleton import ORIGIN, Vector
+from mcz.sources.tables.mvnx_frames import (
+    END,
+    TIME,
+    FrameColumns,
+    channels_of,
+    first_frame,
+    read_frames,
+    unit_of,
+)
 from mcz.sources.tables.restore import restore_table
 from mcz.sources.tables.rows import followed_by
-from mcz.sources.tables.signals import of_columns, read_columns, read_text, table_metadata
+from mcz.sources.tables.signals import (
+    of_columns,
+    read_columns,
+    read_signal,
+    read_text,
+    table_metadata,
+)
 from mcz.sources.tables.source import names_in, section_of, table_source
 from mcz.sources.tables.text_columns import TextColumn, odd_cells, split_text
 from mcz.sources.tables.times import Times, read_times, stated_rate
-from mcz.sources.tables.token_signal import read_signal
 from mcz.sources.text.rows import Rows, counted_up, line_of
-from mcz.sources.text.source import check_text, text_encoding
+from mcz.sources.text.source import MOST_JOINTS, check, check_text, text_encoding
+
+MOST_BYTES = 2**24  # of a header, without the frames of calibration
+MOST_DEPTH = 32  # of elements in each other
+DECIMALS = 9  # of sums of points
+ROOT = "mvnx"
+LISTS = (  # elements whose children have labels
+    "segments",
+    "sensors",
+    "joints",
+    "ergonomicJointAngles",
+    "footContactDefinition",
+    "fingerTrackingSegmentsLeft",
+    "fingerTrackingSegmentsRight",
+    "fingerTrackingJointsLeft",
+    "fingerTrackingJointsRight",
+)
+TEXTS = ("pos_b", "pos_s", "connector1", "connector2", "comment")
+MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+
+Place = tuple[str, str]  # a segment and a point of it
+
+_ROOT = re.compile(rb"<mvnx[\s>]")
+_DATE = re.compile(  # Tue Nov 13 05:17:11.827 2018
+    rf"(?:\S+ )?({'|'.join(MONTHS)}) +(\d{{1,2}}) (\d\d:\d\d:\d\d(?:\.\d{{1,6}})?) (\d{{4}})", re.I
+)
+_DECIMAL = re.compile(r"[-+]?[0-9]{1,9}\.?[0-9]{0,15}")
+
+
+@dataclass(slots=True)
+class Header:
+    """The names in a header; ``frames`` is the offset of that element.
+
+    ``labels``: of each of ``LISTS``, in order. ``points``: of each segment, by name, in meters
+    along its axes. ``connectors``: the points of two segments that each joint of a body connects.
+    """
+
+    frames: int = 0
+    system: Mapping[str, str] = field(default_factory=dict)
+    subject: Mapping[str, str] = field(default_factory=dict)
+    comment: str = ""
+    labels: dict[str, list[str]] = field(default_factory=dict)
+    points: dict[Place, Vector] = field(default_factory=dict)
+    connectors: list[tuple[Place, Place]] = field(default_factory=list)
+
+    def tails(self) -> dict[str, list[Vector]]:
+        """The points of each segment to which other segments are attached."""
+        tails: dict[str, list[Vector]] = {}
+        for place in dict.fromkeys(near for near, _ in self.connectors):
+            if place in self.points:
+                tails.setdefault(place[0], []).append(self.points[place])
+        return tails
+
+    def origins(self) -> dict[str, Vector]:
+        """The origins of segments whose axes are those of the world, the first one at zero."""
+        origins = {labels[0]: ORIGIN} if (labels := self.labels.get("segments")) else {}
+        for near, far in self.connectors:
+            if near[0] in origins and near in self.points and far in self.points:
+                parts = zip(origins[near[0]], self.points[near], self.points[far], strict=True)
+                x, y, z = (round(origin + a - b, DECIMALS) + 0.0 for origin, a, b in parts)
+                origins.setdefault(far[0], (x, y, z))
+        return origins
+
+    def metadata(self) -> dict[str, str]:
+        """Facts about the recording, by keys of the registry."""
+        version = self.system.get("version", "")
+        facts = {
+            "subject": self.subject.get("label", ""),
+            "system": f"Xsens MVN {version}" if version else "",
+            "description": self.comment,
+            **_date(self.subject.get("recDate", "")),
+        }
+        return {key: value.strip() for key, value in facts.items() if value.strip()}
+
+
+def is_mvnx(head: bytes) -> bool:
+    """Return True if a file that begins with ``head`` seems to be MVNX."""
+    return b"<mvnx" in head and _ROOT.search(head) is not None
+
+
+def read_header(data: bytes) -> Header:
+    """The header of an MVNX file; SourceError, with the number of the line, if it has none.
+
+    It is read as UTF-8, or else as Latin-1, whatever it declares.
+    """
+    start = data[:MOST_BYTES]
+    try:
+        return _Reader(start).read("utf-8")
+    except expat.ExpatError as error:
+        if error.code != _INVALID:
+            raise _refused(error) from None
+    try:
+        return _Reader(start).read("iso-8859-1")
+    except expat.ExpatError as error:
+        raise _refused(error) from None
+
+
+_INVALID = expat.errors.codes[expat.errors.XML_ERROR_INVALID_TOKEN]
+
+
+def _refused(error: expat.ExpatError) -> SourceError:
+    return SourceError(f"not XML: {expat.ErrorString(error.code)}", line=error.lineno)
+
+
+class _Reached(Exception):
+    """The element ``frames`` begins."""
+
+
+class _Reader:
+    """The events of expat -> a Header."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._header = Header()
+        self._path: list[str] = []
+        self._names: list[str] = []  # labels of the elements of ``_path``
+        self._text: list[str] = []
+        self._near: Place = ("", "")
+
+    def read(self, encoding: str) -> Header:
+        parser = expat.ParserCreate(encoding)
+        parser.StartElementHandler = self._start
+        parser.EndElementHandler = self._end
+        parser.CharacterDataHandler = self._characters
+        parser.StartDoctypeDeclHandler = self._refuse_types
+        self._parser = parser
+        try:
+            parser.Parse(self._data, False)
+        except _Reached:
+            return self._header
+        more = f" in {len(self._data)} bytes" if len(self._data) == MOST_BYTES else ""
+        line = line_of(self._data, len(self._data))
+        raise SourceError(f"no element 'frames'{more}; not an MVNX file, or truncated", line=line)
+
+    def _refuse_types(self, *_: object) -> None:
+        line = self._parser.CurrentLineNumber
+        raise SourceError("it declares types (DOCTYPE), which is not supported", line=line)
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        header, path = self._header, self._path
+        if not path and name != ROOT:
+            raise SourceError(f"element {name[:40]!r}, expected {ROOT!r}; not an MVNX file", line=1)
+        if len(path) == MOST_DEPTH:
+            line = self._parser.CurrentLineNumber
+            raise SourceError(f"elements are nested more than {MOST_DEPTH} deep", line=line)
+        label = attributes.get("label", "")
+        if name == "frames":
+            header.frames = self._parser.CurrentByteIndex
+            raise _Reached
+        if path and path[-1] in LISTS:
+            labels = header.labels.setdefault(path[-1], [])
+            labels.append(_printable(label))
+            check(path[-1], len(labels), MOST_JOINTS)
+        elif name == "subject":
+            header.subject = attributes
+        elif name == "mvn":
+            header.system = attributes
+        path.append(name)
+        self._names.append(_printable(label))
+        self._text.clear()
+
+    def _characters(self, text: str) -> None:
+        if self._path and self._path[-1] in TEXTS:
+            self._text.append(text)
+
+    def _end(self, name: str) -> None:
+        text = "".join(self._text)
+        self._text.clear()
+        self._path.pop()
+        self._names.pop()
+        if name in ("pos_b", "pos_s") and len(self._names) >= 3:
+            words = text.split()
+            if len(words) == 3 and all(map(_DECIMAL.fullmatch, words)):
+                x, y, z = map(float, words)
+                self._header.points[self._names[-3], self._names[-1]] = x, y, z
+        elif name in ("connector1", "connector2"):
+            segment, _, point = _printable(text).strip().partition("/")
+            self._near, near = (segment, point), self._near
+            if name == "connector2" and self._path[-2:-1] == ["joints"]:
+                self._header.connectors.append((near, (segment, point)))
+        elif name == "comment":
+            self._header.comment = self._header.comment or text
+
+
+def _printable(text: str) -> str:
+    return "".join(character if ord(character) >= 32 else " " for character in text)
+
+
+def _date(text: str) -> dict[str, str]:
+    """The date and time of a recording; empty unless the text is one in English words."""
+    match = _DATE.fullmatch(text.strip())
+    if match is None:
+        return {}
+    month = MONTHS.index(match[1].title()) + 1
+    date = f"{match[4]}-{month:02d}-{int(match[2]):02d}"
+    return {"date": date, "time": f"{date}T{match[3]}"}
+
+
+def numbered_names(labels: Sequence[str], count: int, what: str) -> list[str]:
+    """The first ``count`` labels, then numbered ones."""
+    return [*labels[:count], *(f"{what} {k + 1}" for k in range(len(labels), count))]
+
 
 FORMAT = "mvnx"
 METERS_CM = 100.0
 MILLISECOND = Fraction(1, 1000)  # the unit of times
-XYZ, WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
-OWNERS = (  # of an element: the list in the header that names its parts, and a part's numbers
-    (r"velocity|acceleration|angular(?:Velocity|Acceleration)", "segments", XYZ),
-    (r"sensor(?:(?:Free)?Acceleration|AngularVelocity|MagneticField)", "sensors", XYZ),
-    (r"sensorOrientation", "sensors", WXYZ),
-    (r"jointAngle(?:XZY)?", "joints", XYZ),
-    (r"jointAngleErgo(?:XZY)?", "ergonomicJointAngles", XYZ),
-    (r"footContacts", "footContactDefinition", ("",)),
-    (r"positionFingers(Left|Right)", "fingerTrackingSegments", XYZ),
-    (r"orientationFingers(Left|Right)", "fingerTrackingSegments", WXYZ),
-    (r"jointAngleFingers(Left|Right)(?:XZY)?", "fingerTrackingJoints", XYZ),
-)
-UNITS = (
-    (r"jointAngle.*", "deg"),
-    (r"velocity", "m/s"),
-    (r"acceleration|sensor(?:Free)?Acceleration", "m/s^2"),
-    (r"angularVelocity|sensorAngularVelocity", "rad/s"),
-    (r"angularAcceleration", "rad/s^2"),
-    (r"centerOfMass|position.*", "m"),
-    (r"ms", "ms"),
-)
-MASS = (  # centerOfMass, of which older files have the first three
-    *(Channel("", axis, "m") for axis in XYZ),
-    *(Channel("", f"velocity.{axis}", "m/s") for axis in XYZ),
-    *(Channel("", f"acceleration.{axis}", "m/s^2") for axis in XYZ),
-)
-
 _ENDED = re.compile(rb"\s*</frames\s*>")
 
 
@@ -124,7 +314,7 @@ def _signal(data: bytes, rows: Rows, columns: Sequence[int]) -> Signal:
 
 
 def _joints(header: Header, columns: FrameColumns) -> tuple[tuple[Joint, ...], list[str]]:
-    """A joint for each segment, and what is odd about their names."""
+    """The joint of each segment, and oddities of their names."""
     labels, n_segments = header.labels.get("segments", []), columns.n_segments
     odd = []
     if len(labels) != n_segments:
@@ -145,26 +335,11 @@ def _joints(header: Header, columns: FrameColumns) -> tuple[tuple[Joint, ...], l
 
 
 def _elements(data: bytes, rows: Rows, header: Header, columns: FrameColumns) -> Iterator[Signal]:
-    """A signal for each element that is no part of the motion."""
+    """Signals of the elements that do not belong to the motion."""
     for name in columns.elements:
         signal = _signal(data, rows, columns.columns[name])
-        yield replace(signal, name=name, channels=_channels(name, signal.n_channels, header))
-
-
-def _channels(element: str, size: int, header: Header) -> tuple[Channel, ...]:
-    """The channels of an element, called as its parts where these have so many numbers."""
-    if element == "centerOfMass" and size <= len(MASS):
-        return MASS[:size]
-    unit = next((unit for pattern, unit in UNITS if re.fullmatch(pattern, element)), "")
-    for pattern, owner, axes in OWNERS:
-        match = re.fullmatch(pattern, element)
-        if match is None:
-            continue
-        labels = header.labels.get(owner + "".join(match.groups()), [])
-        if len(labels) * len(axes) == size:
-            ends = [f".{axis}" if axis else "" for axis in axes]
-            return tuple(Channel("", label + end, unit) for label in labels for end in ends)
-    return tuple(Channel("", str(k + 1), unit) for k in range(size))
+        channels = channels_of(name, signal.n_channels, header.labels)
+        yield replace(signal, name=name, channels=channels)
 
 
 def _attributes(
@@ -175,9 +350,8 @@ def _attributes(
     for name in columns.attributes:
         if columns.column(name) not in texts:
             label = name[1:]
-            unit = next((unit for pattern, unit in UNITS if re.fullmatch(pattern, label)), "")
             signal = read_columns(data, rows, [at])
-            yield replace(signal, name=label, channels=(Channel("", label, unit),))
+            yield replace(signal, name=label, channels=(Channel("", label, unit_of(label)),))
             at += 1
 
 

@@ -1,4 +1,4 @@
-"""The frames of an MVNX file: where their numbers are, and the columns that these become.
+"""The frames of an MVNX file: places of their numbers, their columns, and channels of these.
 
 A frame is a tag with attributes, elements of text, and nothing else: no comment, no element in
 another, no CDATA. The tags and blanks between the numbers are gaps of a row.
@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from itertools import islice
 
 from mcz.errors import SourceError
+from mcz.model.motion import Channel
 from mcz.model.skeleton import POSITION_KINDS, QUATERNION_KINDS
 from mcz.model.text_format import quote
 from mcz.sources.tables.csv_files import MAX_COLUMNS
 from mcz.sources.text import MARKUP
-from mcz.sources.text.layout import FRAME_NUMBER
-from mcz.sources.text.notes import FRAME_NUMBER_TEXT
+from mcz.sources.text.layout import FRAME_NUMBER, FRAME_NUMBER_TEXT
 from mcz.sources.text.rows import DENSE, Rows, Token, line_of, read_rows
 
 POSITION, ORIENTATION = "position", "orientation"
@@ -25,6 +25,32 @@ INDEX, TIME, TYPE = "@index", "@time", "@type"  # @: an attribute of frames
 NORMAL = (b"normal", b"")  # types of frames of motion
 END = b"</frame>"
 MOST_PARTS = 64  # elements and attributes of a frame
+XYZ, WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
+OWNERS = (  # of an element: the list in the header that names its parts, and a part's numbers
+    (r"velocity|acceleration|angular(?:Velocity|Acceleration)", "segments", XYZ),
+    (r"sensor(?:(?:Free)?Acceleration|AngularVelocity|MagneticField)", "sensors", XYZ),
+    (r"sensorOrientation", "sensors", WXYZ),
+    (r"jointAngle(?:XZY)?", "joints", XYZ),
+    (r"jointAngleErgo(?:XZY)?", "ergonomicJointAngles", XYZ),
+    (r"footContacts", "footContactDefinition", ("",)),
+    (r"positionFingers(Left|Right)", "fingerTrackingSegments", XYZ),
+    (r"orientationFingers(Left|Right)", "fingerTrackingSegments", WXYZ),
+    (r"jointAngleFingers(Left|Right)(?:XZY)?", "fingerTrackingJoints", XYZ),
+)
+UNITS = (
+    (r"jointAngle.*", "deg"),
+    (r"velocity", "m/s"),
+    (r"acceleration|sensor(?:Free)?Acceleration", "m/s^2"),
+    (r"angularVelocity|sensorAngularVelocity", "rad/s"),
+    (r"angularAcceleration", "rad/s^2"),
+    (r"centerOfMass|position.*", "m"),
+    (r"ms", "ms"),
+)
+MASS = (  # centerOfMass, of which older files have the first three
+    *(Channel("", axis, "m") for axis in XYZ),
+    *(Channel("", f"velocity.{axis}", "m/s") for axis in XYZ),
+    *(Channel("", f"acceleration.{axis}", "m/s^2") for axis in XYZ),
+)
 
 _NAME = rb"[A-Za-z_][\w.-]*"
 _VALUE = rb"\s*=\s*(?:\"(?P<double>[^\"<]*)\"|'(?P<single>[^'<]*)')"
@@ -250,3 +276,29 @@ def columns_of(sizes: Mapping[str, int], numbered: bool) -> FrameColumns:
     if at > MAX_COLUMNS:
         raise SourceError(f"{at} numbers a frame exceed the limit of {MAX_COLUMNS}")
     return FrameColumns(columns, kinds, int(n_segments), at)
+
+
+def unit_of(name: str) -> str:
+    """The unit of an element or attribute, "" if it has none or is not known."""
+    return next((unit for pattern, unit in UNITS if re.fullmatch(pattern, name)), "")
+
+
+def channels_of(
+    element: str, size: int, labels_of: Mapping[str, Sequence[str]]
+) -> tuple[Channel, ...]:
+    """Channels of an element with ``size`` numbers, named after its parts if their sizes fit.
+
+    ``labels_of`` gives the names of parts by the list of the header that has them.
+    """
+    if element == "centerOfMass" and size <= len(MASS):
+        return MASS[:size]
+    unit = unit_of(element)
+    for pattern, owner, axes in OWNERS:
+        match = re.fullmatch(pattern, element)
+        if match is None:
+            continue
+        labels = labels_of.get(owner + "".join(match.groups()), [])
+        if len(labels) * len(axes) == size:
+            ends = [f".{axis}" if axis else "" for axis in axes]
+            return tuple(Channel("", label + end, unit) for label in labels for end in ends)
+    return tuple(Channel("", str(k + 1), unit) for k in range(size))

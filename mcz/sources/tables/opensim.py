@@ -16,8 +16,7 @@ from mcz.errors import SourceError
 from mcz.model.motion import Channel, Joint, Motion, Skeleton
 from mcz.model.numbers import scan
 from mcz.sources.tables.csv_text import check_points
-from mcz.sources.tables.plain import plain_storage
-from mcz.sources.tables.restore import restore_table
+from mcz.sources.tables.restore import plain_storage, restore_table
 from mcz.sources.tables.rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.sources.tables.signals import read_columns, table_metadata
 from mcz.sources.tables.source import named_count, names_in, section_of, table_source

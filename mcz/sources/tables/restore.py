@@ -1,24 +1,28 @@
-"""Signals, template, detail and notes -> the text of a table.
+"""The text of a table: restored from its source, or of a motion without one in a plain style.
 
-SPEC.md, "The text of tables", is normative.
+SPEC.md, "The text of tables", is normative for what is restored.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
 from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import FormatError
-from mcz.model.clock import numbers_or_rows
-from mcz.model.motion import Exceptions, Motion, Signal
+from mcz.errors import FormatError, MotionError
+from mcz.model.clock import TIMES, TOLERANCE, Timeline, numbers_or_rows
+from mcz.model.motion import POSITION_KINDS, Channel, Exceptions, Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Ints
 from mcz.sources.restore import printed_count, text_limit, write_rows
-from mcz.sources.tables.layout import Section, fill, parse_sections
+from mcz.sources.tables.layout import Clock, Section, build_table, fill, parse_sections
 from mcz.sources.tables.source import TableNotes
+from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 
 INTEGERS = Grid(GridKind.FIXED)
 
@@ -26,7 +30,7 @@ INTEGERS = Grid(GridKind.FIXED)
 def restore_table(motion: Motion) -> bytes:
     """The text that the source and all signals of ``motion`` make.
 
-    Raises FormatError where the source does not belong to such a motion, and LimitError for a text
+    Raises FormatError if the source does not belong to such a motion, and LimitError for a text
     beyond the limits of ``restore``.
     """
     source, signals = motion.source, motion.signals
@@ -124,3 +128,133 @@ def _with_columns(
         exceptions=signal.exceptions,
         grid_changes=signal.grid_changes,
     )
+
+
+UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m"}
+DECIMALS = 6  # of times that are whole microseconds
+MORE_DECIMALS = 9
+MISSING = b"NaN"  # as OpenSim writes it, to which blank cells at the end of a row are none
+SECONDS = Channel("", "time", "s")
+
+
+def plain_trc(motion: Motion) -> Motion:
+    """``motion`` with the source of a plain TRC; MotionError for what TRC cannot say."""
+    skeleton = motion.skeleton
+    for joint in skeleton.joints:
+        kinds = tuple(channel.kind for channel in joint.channels)
+        if joint.parent >= 0 or kinds != POSITION_KINDS:
+            raise MotionError(f"TRC holds markers only; joint {joint.name!r} is not a marker")
+    unit = UNITS.get(skeleton.unit_cm or 0.0)
+    if unit is None:
+        raise MotionError("TRC needs a length unit of mm, cm or m")
+    rate = f"{float(_rate(motion)):.6f}"
+    first = int(numbers_or_rows(motion.frame_numbers, motion.n_frames)[0]) if motion.n_frames else 1
+    names = _names([joint.name for joint in skeleton.joints], motion.n_frames)
+    values = (rate, rate, "\3", str(len(names)), unit, rate, str(first), str(motion.n_frames))
+    axes = "".join("\tX\1\tY\2\tZ\2" for _ in names)
+    header = (
+        f"\4{_printable(motion.name)}.trc\n\5\n"
+        + "\t".join(values)
+        + "\n\6"
+        + "".join("\t\0\t\t" for _ in names)
+        + f"\n\t{axes}\n\n"
+    )
+    items = [(b"", FRAME_NUMBER, 0), (b"\t", 3 * len(names), 0)]
+    items += [(b"\t", column, 0) for column in range(3 * len(names))]
+    return _with_source(motion, "trc", header, MISSING, items)
+
+
+def plain_storage(motion: Motion, format_name: str = "sto") -> Motion:
+    """``motion`` with the source of a plain STO or MOT, one number a cell."""
+    skeleton = motion.skeleton
+    labels = [
+        f"{address}.{channel.label}" if len(joint.channels) > 1 or channel.kind else address
+        for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)
+        for channel in joint.channels
+    ]
+    labels = _names(labels, motion.n_frames)
+    n = len(labels)
+    degrees = "yes" if skeleton.angle_unit == "deg" else "no"
+    header = f"{_printable(motion.name)}\nversion=1\nnRows=\3\nnColumns={n + 1}\n"
+    header += f"inDegrees={degrees}\nendheader\n"
+    header += "\t".join(("time", *labels)) + "\n"
+    items = [(b"\t" if k else b"", column, 0) for k, column in enumerate((n, *range(n)))]
+    return _with_source(motion, format_name, header, b"nan", items)
+
+
+def _with_source(
+    motion: Motion,
+    format_name: str,
+    header: str,
+    missing: bytes,
+    items: Sequence[tuple[bytes, int, int]],
+) -> Motion:
+    """``motion`` as its first signal and its times, with the source.
+
+    The times are a clock, or a signal where frame numbers do not give them.
+    """
+    clock, times = _times(motion)
+    signals = (motion.signals[0], *times)
+    rows = Layout((), (Pattern(runs_of(items), b"\n"),))
+    numbers = tuple(range(len(signals)))
+    template, detail = build_table([Section(numbers, header.encode(), True, missing, clock, rows)])
+    source = Source(format_name, template, detail)
+    return replace(motion, signals=signals, source=source)
+
+
+def _times(motion: Motion) -> tuple[Clock | None, tuple[Signal, ...]]:
+    """The clock that prints the times of ``motion``, or a signal of them."""
+    timeline = motion.timeline
+    if timeline is None:
+        raise MotionError(
+            "its frame rate is unknown, but a table must state times", clip=motion.name
+        )
+    times = timeline.times
+    noise = TOLERANCE + float(np.spacing(np.abs(times).max(initial=0.0)))
+    exact = (np.abs(np.round(times, DECIMALS) - times) < noise).all()
+    grid = Grid(GridKind.FIXED, DECIMALS if exact else MORE_DECIMALS)
+    clock = _clock(motion, timeline, grid)
+    if clock is not None:
+        return clock, ()
+    rounded = np.round(times, grid.digits)[:, None]
+    return None, (Signal(rounded, (grid,), "time", channels=(SECONDS,), role=TIMES),)
+
+
+def _clock(motion: Motion, timeline: Timeline, grid: Grid) -> Clock | None:
+    """A clock that counts frame numbers; None if there is none that gives the times."""
+    if motion.frame_rate is None:
+        return None
+    numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
+    step = 10**grid.digits / motion.frame_rate / motion.number_step
+    start = Fraction(float(timeline.times[0])).limit_denominator(10**12) * 10**grid.digits
+    offset = start * step.denominator - int(numbers[0]) * step.numerator + step.denominator // 2
+    clock = Clock(grid, step.numerator, step.denominator, math.floor(offset))
+    most = max(abs(clock.offset), step.numerator, step.denominator)
+    if most >= 2**52 or int(numbers.max()) * step.numerator >= 2**62:
+        return None
+    off = np.abs(grid.values(np.array(clock.ordinals(numbers.tolist()))) - timeline.times)
+    return clock if off.max() <= 0.5 * 10.0**-grid.digits + timeline.rounding + TOLERANCE else None
+
+
+def _rate(motion: Motion) -> Fraction:
+    if motion.frame_rate is None:
+        raise MotionError(
+            "its frame rate is unknown, but a table must state times", clip=motion.name
+        )
+    return motion.frame_rate
+
+
+def _names(names: Sequence[str], n_frames: int) -> list[str]:
+    """The names, checked: a cell holds no control code, and no blanks around what it says."""
+    for name in names:
+        if not name or name != name.strip() or any(ord(character) < 32 for character in name):
+            raise MotionError(f"a table cannot hold the name {name!r}")
+    if not n_frames:
+        raise MotionError("there are no rows of numbers")
+    return list(names)
+
+
+def _printable(name: str) -> str:
+    """The name of the motion on a line of its own."""
+    name = name.encode("utf-8", "replace").decode()
+    return "".join(character if ord(character) >= 32 else "_" for character in name)

@@ -23,8 +23,14 @@ from mcz.sources.tables.layout import (
     fill,
     with_phrases,
 )
-from mcz.sources.text.layout import Layout
-from mcz.sources.text.notes import NumberText, PatternRun, RowNotes, checked_runs, checked_texts
+from mcz.sources.text.layout import (
+    Layout,
+    NumberText,
+    PatternRun,
+    RowNotes,
+    checked_runs,
+    checked_texts,
+)
 from mcz.sources.text.rows import Rows
 
 BEFORE = {b"", *(bytes([c]) for c in b'\t ,;"')}  # of a label in a line, b"" at the line's end
@@ -172,7 +178,7 @@ class TableNotes:
         return join_table_notes([(0, stop - start, self.cut(start, stop))])
 
     def of(self, number: int, n_each: int, n_rows: int) -> RowNotes | None:
-        """The notes of a section; FormatError where it has another number of rows a frame."""
+        """The notes of a section; FormatError if it has another number of rows a frame."""
         if number >= len(self.sections):
             return None
         section = self.sections[number]
@@ -187,7 +193,7 @@ class TableNotes:
 
 
 def table_notes(sections: Sequence[tuple[int, RowNotes | None]]) -> TableNotes | None:
-    """The notes of sections that have so many rows a frame; None where all is usual."""
+    """The notes of sections that have so many rows a frame; None if all is usual."""
     notes_by_section = [_sparse(n_each, notes) for n_each, notes in sections]
     return (
         TableNotes(tuple(notes_by_section))
@@ -208,7 +214,7 @@ def _sparse(n_each: int, notes: RowNotes | None) -> SectionNotes:
 def join_table_notes(parts: Sequence[tuple[int, int, bytes]]) -> TableNotes:
     """The notes of (start, stop, TABLE_NOTES) parts, the inverse of ``cut``; the rest is usual.
 
-    Raises FormatError where a part is not a TableNotesFields of ``stop - start`` frames.
+    Raises FormatError if a part is not a TableNotesFields of ``stop - start`` frames.
     """
     joined: list[SectionNotes] = []
     for start, stop, data in sorted(parts):

@@ -20,8 +20,7 @@ from mcz.model.numbers import scan
 from mcz.model.numbers.tokens import kernels
 from mcz.model.types import Bools, Ints
 from mcz.sources.tables.csv_text import DECIMAL_COMMA, NO_NUMBER, check_points
-from mcz.sources.text.layout import MAX_PATTERNS, Pattern, runs_of
-from mcz.sources.text.notes import RowNotes
+from mcz.sources.text.layout import MAX_PATTERNS, Pattern, RowNotes, runs_of
 from mcz.sources.text.rows import DENSE, FEW_CELLS, Rows, line_of, padding
 
 # A column of few texts is stored whole if they seldom change, or if many rows share each.
@@ -116,7 +115,7 @@ def split_text(
 ) -> tuple[Rows, list[TextColumn]]:
     """``rows`` without the text ``columns``, with number columns inserted before ``at``.
 
-    ``columns``: the cell number of each, for messages. Raises SourceError where the texts have too
+    ``columns``: the cell number of each, for messages. Raises SourceError if the texts have too
     many different letters and signs.
     """
     shapes: list[tuple[Ints, list[_Shape]]] = []  # of each column: the shape of each row, and all

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from mcz.errors import SourceError
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Skeleton
 from mcz.sources.tables.layout import NEXT, SAME, UNIT_CM
-from mcz.sources.tables.plain import plain_trc
-from mcz.sources.tables.restore import restore_table
+from mcz.sources.tables.restore import plain_trc, restore_table
 from mcz.sources.tables.rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.sources.tables.signals import read_columns, table_metadata
 from mcz.sources.tables.source import named_count, names_in, section_of, table_source

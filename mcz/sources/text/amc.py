@@ -18,10 +18,9 @@ from mcz.errors import MotionError, SourceError
 from mcz.model.motion import Motion, Skeleton, Source
 from mcz.model.text_format import quote
 from mcz.sources.restore import restore
-from mcz.sources.tables.token_signal import read_signal
+from mcz.sources.tables.signals import read_signal
 from mcz.sources.text.bones import fit, flat, match_bones, match_names
-from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, runs_of
-from mcz.sources.text.notes import RowNotes
+from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, RowNotes, runs_of
 from mcz.sources.text.rows import Rows, Token, counted_up, line_of, read_rows, tail_end
 from mcz.sources.text.source import (
     Arriving,
@@ -189,7 +188,7 @@ def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving
 
 
 def _header(source: Lines) -> tuple[bytes, int | None]:
-    """The lines before the first frame, and its number, None where there is none."""
+    """The lines before the first frame, and its number, None if there is none."""
     header = bytearray()
     for line in source:
         if not header:
@@ -259,7 +258,7 @@ class _ArrivingFrames:
         return joints <= set(match_names(self.skeleton, dict.fromkeys(bones, 0)).values())
 
     def _row(self, bones: Mapping[str, list[bytes]]) -> NDArray[np.float64]:
-        """The values of a frame, (n_channels,), NaN where a bone did not come."""
+        """The values of a frame, (n_channels,), NaN if a bone did not come."""
         if self._counts is None:
             self._counts = {name: len(texts) for name, texts in bones.items()}
             lacking = match_bones(self.skeleton, self._counts)

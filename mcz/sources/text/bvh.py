@@ -17,8 +17,8 @@ from mcz.errors import MotionError, SourceError
 from mcz.model.motion import POSITION_KINDS, Joint, Motion, Skeleton, Source
 from mcz.model.types import Values
 from mcz.sources.restore import restore
+from mcz.sources.tables.signals import read_signal
 from mcz.sources.tables.times import frame_rate, frame_time
-from mcz.sources.tables.token_signal import read_signal
 from mcz.sources.text.hierarchy import read_hierarchy, write_hierarchy
 from mcz.sources.text.layout import Layout, Pattern, runs_of
 from mcz.sources.text.rows import Token, line_of, read_rows, tail_end

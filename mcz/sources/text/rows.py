@@ -20,13 +20,14 @@ from mcz.model.text_format import quote
 from mcz.sources.text import WORDS, Items
 from mcz.sources.text.layout import (
     FRAME_NUMBER,
+    FRAME_NUMBER_TEXT,
     MAX_PATTERNS,
     MAX_ROW_GAPS,
     MAX_WIDTH,
     Pattern,
+    RowNotes,
     runs_of,
 )
-from mcz.sources.text.notes import FRAME_NUMBER_TEXT, RowNotes
 
 Ints = NDArray[np.int64]
 Token = tuple[int, int, int]  # start, stop, column
@@ -54,10 +55,10 @@ def tail_end(data: bytes, at: int) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """All frames: ``start`` and ``stop`` (n_rows, n_columns) of each token, 0 where it is absent.
+    """All frames: ``start`` and ``stop`` (n_rows, n_columns) of each token, 0 if it is absent.
 
-    ``patterns`` come with the most common one first; ``numbers`` are the frame numbers, None where
-    there are none or they count 1, 2, 3, ...; ``ending`` is what follows the last token, None where
+    ``patterns`` come with the most common one first; ``numbers`` are the frame numbers, None if
+    there are none or they count 1, 2, 3, ...; ``ending`` is what follows the last token, None if
     that is its pattern's tail.
     """
 
@@ -104,7 +105,7 @@ def read_rows(
     ``cells``: what a token is, as ``text_kernels.match_rows`` has it. ``room``: how many cells
     there may be for each byte of ``data``, which bounds the memory.
 
-    Raises SourceError where ``frames`` does, where the layout is too irregular to be worth
+    Raises SourceError if ``frames`` does, where the layout is too irregular to be worth
     a template, and where rows name so few columns that the table would dwarf the file.
     """
     widths = widths or {}

@@ -30,8 +30,7 @@ from mcz.model.schema import (
 from mcz.sources.arrays.layout import ArrayDetail, ArrayTemplate
 from mcz.sources.c3d.layout import C3dDetail, C3dOutputsTemplate, C3dTemplate
 from mcz.sources.tables.layout import TableDetail, TableTemplate
-from mcz.sources.text import notes
-from mcz.sources.text.layout import Detail, Template
+from mcz.sources.text.layout import Detail, Notes, Template
 from tools.records import build_record, span
 
 SCHEMAS: dict[str, Any] = {
@@ -152,7 +151,7 @@ VIEWS: dict[str, View] = {
 STREAMS: dict[str, type[Record] | None] = {
     "DATA": None,
     "NOTES": segments.GroupNotes,
-    "ROWS": notes.Notes,
+    "ROWS": Notes,
 }
 
 
