@@ -51,10 +51,9 @@ ALLOWED = ROOMS | {
 # Parts of a room from below: none imports a part of a later line.
 LAYERS = {
     "model": (
-        "checks extras identity indexing notebook text_format threads types",
+        "checks extras identity notebook text_format threads types",
         "schema",
         "numbers",
-        "source",
         "skeleton",
         "signal",
         "clock",

@@ -19,7 +19,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from scipy.spatial.transform import Rotation
 
 import mcz
-from mcz.exchange.datasets.caches import FolderCache, MemoryCache, to_size
+from mcz.exchange.datasets.feature_blocks import FolderCache, MemoryCache, to_size
 from mcz.exchange.datasets.field_table import FIELDS
 from mcz.exchange.datasets.samplers import split
 from mcz.kinematics.poses.conversions import from_matrices

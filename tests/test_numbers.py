@@ -22,8 +22,8 @@ from mcz.model.numbers import (
     GridKind,
     Tokens,
     choose_grid,
+    decimal_kernels,
     fit,
-    kernels,
     print_values,
     scan,
 )
@@ -408,14 +408,14 @@ def test_notation_of_a_number(text: str, exponent: str, start: int) -> None:
     first, point, last = text.lstrip("+-").partition(".")
     assert mantissa == int(first + last)
     assert power == int(exponent[1:] or 0)
-    assert shape >> kernels.SIGNIFICANT & 31 == len((first + last).strip("0"))
-    assert shape >> kernels.FRACTION_DIGITS & 65535 == len(last)
-    assert bool(shape & kernels.POINT) == bool(point)
-    assert bool(shape & kernels.NO_INTEGER) == (first == "")
-    assert bool(shape & kernels.ZERO_INTEGER) == (first == "0")
-    assert bool(shape & kernels.EXTRA_ZERO) == (first[:1] == "0" and len(first) > 1)
-    assert shape & (kernels.MINUS | kernels.PLUS) == "-+".find(text[0]) + 1
-    assert not shape & (kernels.BAD | kernels.LONG)
+    assert shape >> decimal_kernels.SIGNIFICANT & 31 == len((first + last).strip("0"))
+    assert shape >> decimal_kernels.FRACTION_DIGITS & 65535 == len(last)
+    assert bool(shape & decimal_kernels.POINT) == bool(point)
+    assert bool(shape & decimal_kernels.NO_INTEGER) == (first == "")
+    assert bool(shape & decimal_kernels.ZERO_INTEGER) == (first == "0")
+    assert bool(shape & decimal_kernels.EXTRA_ZERO) == (first[:1] == "0" and len(first) > 1)
+    assert shape & (decimal_kernels.MINUS | decimal_kernels.PLUS) == "-+".find(text[0]) + 1
+    assert not shape & (decimal_kernels.BAD | decimal_kernels.LONG)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Si
 from mcz.files.reading.source_files import SourceOptions
 from mcz.kinematics import origins_of, shell_points_of
 from mcz.model.numbers import Grid, GridKind
-from mcz.model.numbers.scaling import Scaling
+from mcz.model.signal import Scaling
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth, write_and_read
 from tests.skeletons import skeletons, values_for

@@ -16,7 +16,7 @@ from mcz.model.types import Floats, JsonObject, Reals
 
 if TYPE_CHECKING:
     from mcz.files.reading.clip import Clip
-    from mcz.kinematics.poses.motion_like import MotionLike
+    from mcz.kinematics.frames import MotionLike
 
 
 CELLS = 48  # of a line: greatest number of decoded segments

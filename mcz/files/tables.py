@@ -394,7 +394,7 @@ def to_pandas(
 
 
 def _names(motion: Motion, joints: Joints) -> tuple[str, ...]:
-    from mcz.kinematics.poses.motion_like import joint_numbers
+    from mcz.kinematics.frames import joint_numbers
 
     every = motion.skeleton.joint_names
     return tuple(every[joint] for joint in joint_numbers(motion.skeleton, joints))

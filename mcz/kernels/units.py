@@ -18,10 +18,8 @@ UNITS: dict[str, tuple[str, ...]] = {
     ),
     "numbers": (
         "mcz.codecs.coding.forms.products",
-        "mcz.model.numbers.kernels",
-        "mcz.model.numbers.print_kernels",
-        "mcz.model.numbers.scan_kernels",
-        "mcz.model.numbers.survey_kernels",
+        "mcz.model.numbers.decimal_kernels",
+        "mcz.model.numbers.token_kernels",
         "mcz.model.numbers.value_kernels",
         "mcz.sources.text.text_kernels",
     ),

@@ -14,11 +14,11 @@ from mcz.kernels import kernel
 from mcz.kernels.types import Floats, Floats2, Floats3, Floats4, Ints, Ints2, Ints3
 
 
-class Joints(NamedTuple):
+class JointTable(NamedTuple):
     """A skeleton, an entry a joint.
 
     ``changes``, ``backs`` and ``owns`` (n_joints, 3, 3): C_parent^-1 C, C_parent^-1 and C;
-    ``offsets`` (n_joints, 3), ``moves`` (n_joints, 3) and ``turns`` (n_joints, most, 2), -1 where
+    ``offsets`` (n_joints, 3), ``moves`` (n_joints, 3) and ``turns`` (n_joints, most, 2), -1 if
     there is no column.
     """
 
@@ -33,7 +33,7 @@ class Joints(NamedTuple):
     radians: float
 
 
-class Points(NamedTuple):
+class PointTable(NamedTuple):
     """``joints`` (n_points,), and ``tails`` (n_points, 3) along the axes of each."""
 
     joints: Ints
@@ -42,7 +42,12 @@ class Points(NamedTuple):
 
 @kernel
 def position_points(
-    values: Floats, joints: Joints, points: Points, out: Floats2, origins: Floats2, axes: Floats3
+    values: Floats,
+    joints: JointTable,
+    points: PointTable,
+    out: Floats2,
+    origins: Floats2,
+    axes: Floats3,
 ) -> None:
     """Write the positions of ``points`` to ``out`` (n_points, 3), and ``origins`` and ``axes``.
 
@@ -56,7 +61,12 @@ def position_points(
 
 @kernel
 def place_frames(
-    values: Floats2, joints: Joints, indices: Ints, points: Points, out: Floats3, kept: Floats4
+    values: Floats2,
+    joints: JointTable,
+    indices: Ints,
+    points: PointTable,
+    out: Floats3,
+    kept: Floats4,
 ) -> None:
     """Write ``points`` of all frames to ``out`` (n_frames, n_points, 3), and axes to ``kept``.
 
@@ -77,7 +87,7 @@ def place_frames(
 
 
 @kernel
-def turn_frames(values: Floats2, joints: Joints, indices: Ints, out: Floats4) -> None:
+def turn_frames(values: Floats2, joints: JointTable, indices: Ints, out: Floats4) -> None:
     """Write the local rotations of the joints ``indices``, (n_frames, n_indices, 3, 3).
 
     They are C M C^-1, M the product of the joint's own turns: the identity in the rest pose.
@@ -99,7 +109,7 @@ def turn_frames(values: Floats2, joints: Joints, indices: Ints, out: Floats4) ->
 
 
 def _place(
-    values: Floats, joints: Joints, joint: int, arm: Floats, origins: Floats2, axes: Floats3
+    values: Floats, joints: JointTable, joint: int, arm: Floats, origins: Floats2, axes: Floats3
 ) -> None:
     """The origin and the axes of a joint whose parent is placed; ``arm`` (3,) is scratch."""
     for i in range(3):
@@ -131,7 +141,7 @@ def _place(
     _turn(values, joints, joint, own)
 
 
-def _turn(values: Floats, joints: Joints, joint: int, own: Floats2) -> None:
+def _turn(values: Floats, joints: JointTable, joint: int, own: Floats2) -> None:
     """Turn the axes of a joint, (3, 3), by its channels."""
     turns = joints.turns
     for turn in range(turns.shape[1]):
@@ -147,7 +157,7 @@ def _turn(values: Floats, joints: Joints, joint: int, own: Floats2) -> None:
             own[i, k] = after * cosine - before * sine
 
 
-def _mark(points: Points, origins: Floats2, axes: Floats3, out: Floats2) -> None:
+def _mark(points: PointTable, origins: Floats2, axes: Floats3, out: Floats2) -> None:
     for point in range(len(points.joints)):
         joint = points.joints[point]
         for i in range(3):

@@ -1,17 +1,28 @@
 """Point positions and joint rotations: ``FramePoses`` of many frames, ``FramePositions`` of one.
 
-Compiled where the skeleton only turns and moves, from ``Chain`` otherwise: equal to 1e-9.
+Kernels compute them if the skeleton only turns and moves, otherwise ``Chain``: equal to 1e-9.
+Motions and clips are accessed alike; a clip decodes only the needed joints and frames.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import lru_cache
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import DTypeLike
 
+from mcz.errors import OptionError
 from mcz.kinematics.chain import IDENTITY, Chain, SkeletonKey
-from mcz.kinematics.frame_kernels import Joints, Points, place_frames, position_points, turn_frames
+from mcz.kinematics.frame_kernels import (
+    JointTable,
+    PointTable,
+    place_frames,
+    position_points,
+    turn_frames,
+)
 from mcz.kinematics.points import (
     discard_infinite,
     listed_points,
@@ -21,8 +32,11 @@ from mcz.kinematics.points import (
     points_of,
     positions_of,
 )
-from mcz.model.motion import Skeleton
-from mcz.model.types import Floats
+from mcz.model.clock import Timeline, known_timeline
+from mcz.model.motion import Motion, Skeleton, check_poses
+from mcz.model.skeleton import Joints, joint_columns, joint_list
+from mcz.model.types import Floats, Reals, Values
+from mcz.model.units import unit_cm_of
 
 
 class FramePoses:
@@ -41,7 +55,7 @@ class FramePoses:
             for joint, tail in self._points
         ]
         self._tails = np.array(tails).reshape(len(tails), 3)
-        self._tables: tuple[Joints, Points] | None = None
+        self._tables: tuple[JointTable, PointTable] | None = None
         if not is_elaborate(self.chain):
             self._tables = tables_of(self.chain, [joint for joint, _ in self._points], tails)
 
@@ -77,7 +91,7 @@ class FramePoses:
                     out[rows, number] = point_position(self.chain, joint, tail, columns, pose).T
         else:
             known = self._tables[1]
-            chosen = Points(known.joints[list(points)], known.tails[list(points)])
+            chosen = PointTable(known.joints[list(points)], known.tails[list(points)])
             self._place(values, self.joints_of(points), chosen, out, np.empty((0, 0, 3, 3)))
         discard_infinite(out)
         return out
@@ -90,7 +104,7 @@ class FramePoses:
                 for number, joint in enumerate(joints):
                     out[rows, number] = pose.origins[joint].T
         else:
-            chosen = Points(np.array(joints, np.int64), np.zeros((len(joints), 3)))
+            chosen = PointTable(np.array(joints, np.int64), np.zeros((len(joints), 3)))
             self._place(values, joints, chosen, out, np.empty((0, 0, 3, 3)))
         discard_infinite(out)
         return out
@@ -105,7 +119,7 @@ class FramePoses:
                     out[rows, number] = np.moveaxis(pose.axes[joint], 2, 0)
         else:
             kept = np.empty((len(values), n_joints, 3, 3))
-            none = Points(np.empty(0, np.int64), np.empty((0, 3)))
+            none = PointTable(np.empty(0, np.int64), np.empty((0, 3)))
             self._place(values, joints, none, np.empty((len(values), 0, 3)), kept)
             out = kept[:, list(joints)]
         for number, joint in enumerate(joints):
@@ -134,7 +148,7 @@ class FramePoses:
         return out
 
     def _place(
-        self, values: Floats, joints: Sequence[int], points: Points, out: Floats, kept: Floats
+        self, values: Floats, joints: Sequence[int], points: PointTable, out: Floats, kept: Floats
     ) -> None:
         assert self._tables is not None
         indices = np.array(self.above(joints), np.int64)
@@ -158,7 +172,7 @@ def _frame_poses_of(key: SkeletonKey) -> FramePoses:
 class FramePositions:
     """Positions of the points of ``skeleton`` and, on request, its virtual markers.
 
-    Maps the channels of a frame, (n_channels,), to (n_places, 3) in length units, NaN where
+    Maps the channels of a frame, (n_channels,), to (n_places, 3) in length units, NaN if
     unknown. Results equal ``positions_of`` and ``virtual_markers_of`` to 1e-9, with the same
     errors.
     """
@@ -212,7 +226,9 @@ def is_elaborate(chain: Chain) -> bool:
     )
 
 
-def tables_of(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Joints, Points]:
+def tables_of(
+    chain: Chain, points: list[int], tails: list[Floats]
+) -> tuple[JointTable, PointTable]:
     """Skeleton tables for the kernels."""
     links = chain.links
     n_joints = len(links)
@@ -232,7 +248,7 @@ def tables_of(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Joi
         own = chain.turned[joint]
         if own is not None:
             owns[joint] = own
-    joints = Joints(
+    joints = JointTable(
         np.array([link.parent for link in links], np.int64),
         changes,
         np.array([link.offset for link in links]).reshape(n_joints, 3),
@@ -243,4 +259,124 @@ def tables_of(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Joi
         turns,
         float(chain.radians),
     )
-    return joints, Points(np.array(points, np.int64), np.array(tails).reshape(len(points), 3))
+    return joints, PointTable(np.array(points, np.int64), np.array(tails).reshape(len(points), 3))
+
+
+Frames = tuple[int, int] | slice | None
+
+
+class ClipLike(Protocol):
+    """Interface of a Clip as this package uses it."""
+
+    name: str
+    n_frames: int
+
+    @property
+    def skeleton(self) -> Skeleton: ...
+    @property
+    def frame_rate(self) -> Fraction | None: ...
+    @property
+    def signals(self) -> Sequence[Any]: ...
+    @property
+    def timeline(self) -> Timeline | None: ...
+    def read(
+        self, frames: tuple[int, int] | None = None, joints: Joints = None, resolution: int = 0
+    ) -> Values: ...
+
+
+MotionLike = Motion | ClipLike
+
+
+def frame_range(moving: MotionLike, frames: Frames) -> tuple[int, int]:
+    """Frames a <= f < b, from a pair or a slice; raises OptionError if they are out of range.
+
+    A slice counts as numpy's do: ends may be left out, negative or beyond.
+    """
+    if isinstance(frames, slice):
+        start, stop, step = frames.indices(moving.n_frames)
+        if step != 1:
+            raise OptionError(
+                f"frames is {frames}, but a step is not supported; take every n-th frame of "
+                "the result"
+            )
+        return start, max(start, stop)
+    start, stop = frames if frames is not None else (0, moving.n_frames)
+    if not 0 <= start <= stop <= moving.n_frames:
+        raise OptionError(f"{moving.name!r} has {moving.n_frames} frames, not {start}:{stop}")
+    return start, stop
+
+
+def joint_numbers(skeleton: Skeleton, joints: Joints) -> list[int]:
+    """The indices of these joints, None: all; raises MotionError."""
+    if joints is None:
+        return list(range(skeleton.n_joints))
+    return [skeleton.find(joint) for joint in joint_list(joints)]
+
+
+def values_of(moving: MotionLike, frames: tuple[int, int], joints: Sequence[int]) -> Floats:
+    """The channels of these joints, float64 (n_frames, n_channels), NaN if invalid.
+
+    Columns of other joints are undefined. Raises MotionError if the rows of the motion are not
+    poses, see ``check_poses``.
+    """
+    skeleton = moving.skeleton
+    check_poses(moving.name, moving.signals[0])
+    if isinstance(moving, Motion):
+        return np.asarray(moving.signals[0].cut(*frames).masked(), np.float64)
+    columns = joint_columns(skeleton, joints)
+    if len(columns) == skeleton.n_channels:
+        return np.asarray(moving.read(frames), np.float64)
+    values = np.zeros((frames[1] - frames[0], skeleton.n_channels))
+    if columns:
+        values[:, columns] = moving.read(frames, joints=joints)
+    return values
+
+
+def scale_to(skeleton: Skeleton, unit: str | None) -> float:
+    """Factor from length units to ``unit`` (cm, m, mm ...); 1 if None.
+
+    Raises OptionError for another unit, and where the skeleton's is unknown.
+    """
+    if unit is None:
+        return 1.0
+    unit_cm = unit_cm_of(unit)
+    if skeleton.unit_cm is None:
+        raise OptionError(
+            f"the length unit of skeleton {skeleton.name!r} is unknown, so it cannot be "
+            f"converted to {unit}; leave out unit=, or set it when reading"
+        )
+    return skeleton.unit_cm / unit_cm
+
+
+def times(moving: MotionLike, frames: Frames = None, *, signal: int | str = 0) -> Floats:
+    """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
+
+    Times of a signal of times; else, by frame numbers and rate, from ``first_time`` on or, without
+    one, (number - 1) / rate, so that frame 1 is at 0 s. Events are on the same clock. ``signal``,
+    by index or name: the times of its samples, evenly spaced from each frame on. ``frames`` (a, b)
+    or a slice. Raises OptionError if neither times nor a rate are known.
+    """
+    start, stop = frame_range(moving, frames)
+    timeline = known_timeline(moving.name, moving.timeline)
+    per_frame = signal_of(moving, signal).samples_per_frame
+    return timeline.samples(per_frame)[start * per_frame : stop * per_frame]
+
+
+def signal_of(moving: MotionLike, signal: int | str) -> Any:
+    """A signal by index or name, the first of its name; raises OptionError."""
+    names = [each.name for each in moving.signals]
+    if isinstance(signal, str) and signal in names:
+        return moving.signals[names.index(signal)]
+    if isinstance(signal, str) or not 0 <= signal < len(names):
+        raise OptionError(
+            f"{moving.name!r} has no signal {signal!r}; its signals are {', '.join(names)}"
+        )
+    return moving.signals[signal]
+
+
+def as_type(values: Reals, dtype: DTypeLike) -> Reals:
+    """``values`` as float64 or float32; raises OptionError for another type."""
+    new_type = np.dtype(dtype)
+    if new_type not in (np.float64, np.float32):
+        raise OptionError(f"dtype is {new_type}; it must be float64 or float32")
+    return values.astype(new_type, copy=False)

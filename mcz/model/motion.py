@@ -25,6 +25,7 @@ from mcz.model.checks import (
     check_fields,
     of_type,
     optional,
+    row_numbers,
     several,
 )
 from mcz.model.clock import (
@@ -42,11 +43,10 @@ from mcz.model.clock import (
     times_signal_fault,
     unit_of_times,
 )
-from mcz.model.indexing import row_numbers
 from mcz.model.notebook import html_of
 from mcz.model.numbers.grid import grid_blocks as grid_blocks
-from mcz.model.numbers.scaling import Exceptions as Exceptions
 from mcz.model.signal import ROLES as ROLES
+from mcz.model.signal import Exceptions as Exceptions
 from mcz.model.signal import Signal as Signal
 from mcz.model.signal import check_poses as check_poses
 from mcz.model.skeleton import ANGLE_KINDS as ANGLE_KINDS
@@ -59,12 +59,12 @@ from mcz.model.skeleton import ROTATION_KINDS as ROTATION_KINDS
 from mcz.model.skeleton import TURNING_KINDS as TURNING_KINDS
 from mcz.model.skeleton import VECTOR_KINDS as VECTOR_KINDS
 from mcz.model.skeleton import Channel as Channel
+from mcz.model.skeleton import FrameNotes as FrameNotes
 from mcz.model.skeleton import Joint as Joint
 from mcz.model.skeleton import Skeleton as Skeleton
+from mcz.model.skeleton import Source as Source
 from mcz.model.skeleton import Vector as Vector
 from mcz.model.skeleton import joint_columns as joint_columns
-from mcz.model.source import FrameNotes as FrameNotes
-from mcz.model.source import Source as Source
 from mcz.model.types import Floats, Ints, Values
 
 
@@ -98,10 +98,10 @@ MOTION = {
 class Motion:
     """A skeleton in motion: the motion signal first, then any others (analog, ...).
 
-    ``frame_rate`` in frames a second, None while unknown; ``frame_rate_exact`` is False where the
+    ``frame_rate`` in frames a second, None while unknown; ``frame_rate_exact`` is False if the
     source has a rounded frame time. ``frame_numbers`` (int64, ascending) is None for 1, 2, 3, ...;
-    they usually rise by ``number_step``, more than 1 where frames were left out evenly.
-    ``first_time`` is the time of the first frame in seconds; None where its number implies it:
+    they usually rise by ``number_step``, more than 1 if frames were left out evenly.
+    ``first_time`` is the time of the first frame in seconds; None if its number implies it:
     frame 1 is at 0 s. ``metadata`` maps keys of SPEC.md's registry, or private ``x-`` keys, to
     text. ``times`` has the time of each frame.
     """
@@ -187,7 +187,7 @@ class Motion:
 
     @property
     def values(self) -> Values:
-        """The first signal, which is the motion, (n_frames, n_channels), NaN where invalid."""
+        """The first signal, which is the motion, (n_frames, n_channels), NaN if invalid."""
         return self.signals[0].masked()
 
     @property
@@ -248,7 +248,7 @@ class Motion:
 
     @property
     def timeline(self) -> Timeline | None:
-        """The times of all frames, None where neither times nor a rate are known."""
+        """The times of all frames, None if neither times nor a rate are known."""
         column = None
         for signal in self.signals_of(TIMES):
             column = column_of(signal.masked()[:, 0], signal.grids[0], unit_of_times(signal))

@@ -1,10 +1,14 @@
-"""Joints and their channels, in the order of a file. SPEC.md, "SKEL", has the stored form."""
+"""Joints and their channels, in the order of a file, and the source file that they come from.
+
+SPEC.md, "SKEL", has the stored form.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
+from typing import Protocol
 
 import numpy as np
 
@@ -12,19 +16,75 @@ from mcz.errors import MotionError
 from mcz.model import text_format
 from mcz.model.checks import (
     DATA,
+    HASH,
     INTEGER,
     NAME,
     NUMBER,
     TEXT,
     TRUTH,
     VECTOR,
+    Rule,
     check_fields,
     of_type,
     optional,
     several,
 )
-from mcz.model.source import Source
 from mcz.model.types import Floats, Ints
+
+
+class FrameNotes(Protocol):
+    """Notes of a source on each frame, other than its values; a source format defines them."""
+
+    def cut(self, start: int, stop: int) -> bytes:
+        """The notes of frames start <= f < stop as bytes of a segment, b"" if there are none."""
+
+    def part(self, start: int, stop: int) -> FrameNotes:
+        """The notes of frames start <= f < stop, numbered from 0."""
+
+
+SOURCE = {
+    "format": TEXT,
+    "template": DATA,
+    "detail": DATA,
+    "notes": Rule("notes of frames or None", lambda notes: notes and notes.cut and notes),
+    "path": TEXT,
+    "size": INTEGER,
+    "sha256": HASH,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Data, other than the values, to restore a source file byte for byte.
+
+    ``template`` is shared by clips of the same layout; ``detail`` belongs to this clip; ``notes``
+    holds notes on single frames. The source format defines all three.
+    """
+
+    format: str
+    template: bytes = field(repr=False)
+    detail: bytes = b""
+    notes: FrameNotes | None = field(default=None, repr=False)
+    path: str = ""
+    size: int = 0
+    sha256: bytes = b""
+
+    __repr__ = text_format.source_text
+
+    def __post_init__(self) -> None:
+        check_fields(self, SOURCE)
+        if self.size < 0:
+            raise MotionError(f"source: size is {self.size}")
+
+    def of_no_file(self) -> Source:
+        """The same for changed values or frames: without size and hash."""
+        return replace(self, size=0, sha256=b"")
+
+    def cut(self, start: int, stop: int) -> Source:
+        """The source of frames start <= f < stop."""
+        notes = self.notes and self.notes.part(start, stop)
+        return replace(self, notes=notes).of_no_file()
+
 
 Vector = tuple[float, float, float]
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -259,7 +319,7 @@ class Skeleton:
     def find(self, joint: int | str) -> int:
         """The index of a joint given by index or by name, ``name[#n]`` where a name repeats.
 
-        Raises MotionError where there is no such joint.
+        Raises MotionError if there is no such joint.
         """
         if isinstance(joint, str):
             addresses = self.addresses()

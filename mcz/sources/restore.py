@@ -18,8 +18,8 @@ from mcz.kernels import SPARE
 from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind, print_values, scan
-from mcz.model.numbers.magnitudes import POWERS
-from mcz.model.numbers.textgrids import WIDEST
+from mcz.model.numbers.rules import POWERS
+from mcz.model.numbers.text_grids import WIDEST
 from mcz.model.numbers.tokens import TENS
 from mcz.model.numbers.values import print_rules
 from mcz.model.types import Floats, Ints, Values

@@ -30,7 +30,7 @@ from mcz.errors import OptionError
 from mcz.kinematics.contacts import USUAL_RATE, FootTracks
 from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.points import points_of, positions_of
-from mcz.model.indexing import merged_ranges
+from mcz.model.checks import merged_ranges
 from mcz.model.motion import Skeleton
 
 Run = tuple[str, int, int]  # a joint whose first point stands, its first frame, number of frames

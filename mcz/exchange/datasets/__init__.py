@@ -1,8 +1,8 @@
 """Data sets: windows of many clips as arrays, for whoever trains or measures on them.
 
 ``dataset`` finds the clips; ``field_table`` has the arrays that are made of them; ``sources`` reads
-the frames, ``blocks`` keeps the features of some at a time, in one of the ``caches``; ``Dataset``
-counts, cuts, shuffles and splits.
+the frames, ``feature_blocks`` computes and caches features; ``Dataset`` counts, cuts, shuffles and
+splits.
 """
 
 from __future__ import annotations

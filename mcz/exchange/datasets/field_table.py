@@ -14,9 +14,8 @@ from mcz.files.reading.clip import Clip
 from mcz.hints import Hint
 from mcz.kinematics import point_names
 from mcz.kinematics.contacts import FootTracks
-from mcz.kinematics.frames import frame_poses_of
+from mcz.kinematics.frames import frame_poses_of, joint_numbers, scale_to
 from mcz.kinematics.poses.conversions import from_matrices
-from mcz.kinematics.poses.motion_like import joint_numbers, scale_to
 from mcz.kinematics.poses.trajectories import accelerations_of, find_points, velocities_of
 from mcz.kinematics.rotations import matrices_of_vectors
 from mcz.model.motion import Skeleton

@@ -19,6 +19,8 @@ from mcz.model.motion import Skeleton
 from mcz.model.skeleton import joint_columns
 from mcz.model.types import Floats, Reals
 
+Arrays = Mapping[str, Reals]  # features by field
+
 WHOLE = 2**62  # the reach of a field that needs all frames of a clip
 
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mcz.errors import MczError, OptionError
-from mcz.exchange.datasets.caches import to_size
-from mcz.exchange.datasets.feature_blocks import Settings
+from mcz.exchange.datasets.feature_blocks import Settings, to_size
 from mcz.exchange.datasets.fields import SignalShape, Units, names_of
 from mcz.exchange.datasets.sources import MOST_OPEN, Member, Recipe, recipe_of
 from mcz.exchange.datasets.windows import Dataset

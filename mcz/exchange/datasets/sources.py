@@ -15,9 +15,8 @@ import numpy as np
 
 from mcz.container.caches import DecodedCache, SharedCache
 from mcz.errors import OptionError
-from mcz.exchange.datasets.caches import Arrays
 from mcz.exchange.datasets.field_table import SIGNAL, parse_fields, subject_of
-from mcz.exchange.datasets.fields import WHOLE, Field, Rows, Subject, Units, features_of
+from mcz.exchange.datasets.fields import WHOLE, Arrays, Field, Rows, Subject, Units, features_of
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.kinematics.chain import Floats

@@ -24,7 +24,7 @@ from mcz.exchange.datasets.samplers import EPOCH, SEED, SIZE, WindowBatchSampler
 from mcz.exchange.datasets.sources import Member
 from mcz.files.reading.file import File
 from mcz.kinematics.poses.conversions import continuous_signs
-from mcz.model.indexing import row_numbers
+from mcz.model.checks import row_numbers
 from mcz.model.text_format import counted
 from mcz.model.types import JsonObject, Reals
 

@@ -44,7 +44,7 @@ from mcz.files.editing.appending import (
 from mcz.files.editing.rewriting import UNPROTECTED, disk_path, plan_whole, rewriting
 from mcz.files.reading.file import open_bytes
 from mcz.files.writing.atomic import replacing_file
-from mcz.model.indexing import merged_ranges
+from mcz.model.checks import merged_ranges
 from mcz.model.text_format import brief
 from mcz.model.types import Progress, Target
 

@@ -29,7 +29,7 @@ from mcz.container.segments import (
 from mcz.errors import FormatError, MczError
 from mcz.files.reading.signal_info import SignalInfo, salvage
 from mcz.kernels import lacks_compiled_kernels
-from mcz.model.indexing import merged_ranges
+from mcz.model.checks import merged_ranges
 from mcz.model.motion import Exceptions, Signal
 from mcz.model.numbers import Grid, GridKind, values_of
 from mcz.model.threads import map_in_order, thread_limit, timing, useful_threads

@@ -18,7 +18,7 @@ from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.views import pick_notes
 from mcz.model.clock import SAME_RATE, usual_step
 from mcz.model.motion import FrameNotes, Motion, Skeleton, Source
-from mcz.model.numbers.scaling import Scaling
+from mcz.model.signal import Scaling
 from mcz.model.types import JsonObject
 from mcz.sources import FORMATS, Format, format_by_id, recording_of
 

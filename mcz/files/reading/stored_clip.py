@@ -30,8 +30,8 @@ from mcz.files.reading.source_info import (
 )
 from mcz.kinematics import point_names
 from mcz.model.motion import Skeleton
-from mcz.model.numbers.scaling import Scaling
 from mcz.model.schema import parse
+from mcz.model.signal import Scaling
 
 if TYPE_CHECKING:
     from mcz.sources.c3d.recording import Recording

@@ -13,13 +13,13 @@ from numpy.typing import DTypeLike, NDArray
 from mcz.errors import OptionError
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.signal_reader import SignalReader
+from mcz.model.checks import Rows, row_numbers
 from mcz.model.clock import numbers_or_rows
-from mcz.model.indexing import Rows, row_numbers
 from mcz.model.motion import Exceptions, FrameNotes, Motion, Signal
 from mcz.model.types import Values
 
 if TYPE_CHECKING:
-    from mcz.kinematics.poses.motion_like import MotionLike
+    from mcz.kinematics.frames import MotionLike
 
 
 class Masked(NamedTuple):

@@ -7,8 +7,8 @@ Functions take a Motion or a Clip, of which only the needed part is decoded.
 
 from __future__ import annotations
 
+from mcz.kinematics.frames import times
 from mcz.kinematics.poses.conversions import rotations
-from mcz.kinematics.poses.motion_like import times
 from mcz.kinematics.poses.resampling import resample
 from mcz.kinematics.poses.trajectories import (
     Root,

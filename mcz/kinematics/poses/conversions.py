@@ -14,13 +14,13 @@ from numpy.typing import DTypeLike
 
 from mcz.errors import OptionError
 from mcz.kinematics.chain import IDENTITY
-from mcz.kinematics.poses.motion_like import (
+from mcz.kinematics.frames import (
     Frames,
     MotionLike,
     as_type,
+    frame_poses_of,
     frame_range,
     joint_numbers,
-    poses_of,
     values_of,
 )
 from mcz.kinematics.rotations import (
@@ -123,7 +123,7 @@ def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
     """The inverse of ``from_matrices``: (..., *FORMS[form]) to (..., 3, 3).
 
     Quaternions may have any length but 0; of 6D vectors the second is made orthogonal to the first.
-    Raises OptionError where the shape does not fit.
+    Raises OptionError if the shape does not fit.
     """
     check_form(form)
     given: Floats = np.asarray(values, np.float64)
@@ -234,8 +234,8 @@ def rotations(
     writes it. ``joints`` by index or name, None: all; ``frames`` (a, b) or a slice.
 
     Rotations are active, for column vectors: a bone that points along d in the rest pose points
-    along W d. NaN where a channel that matters is invalid. Raises OptionError, and MotionError
-    where the skeleton has no kinematics.
+    along W d. NaN if a channel that matters is invalid. Raises OptionError, and MotionError
+    if the skeleton has no kinematics.
     """
     check_form(form)
     check_order(order)
@@ -243,7 +243,7 @@ def rotations(
         raise OptionError(f"unknown space {space!r}; it must be one of {', '.join(SPACES)}")
     skeleton, span = moving.skeleton, frame_range(moving, frames)
     chosen = joint_numbers(skeleton, joints)
-    poses = poses_of(skeleton)
+    poses = frame_poses_of(skeleton)
     needed = chosen if space == "local" else poses.above(chosen)
     values = values_of(moving, span, needed)
     turns = poses.local(values, chosen) if space == "local" else poses.world(values, chosen)
@@ -268,7 +268,7 @@ def scalar_quaternions(
 ) -> list[Quaternion]:
     """The columns of quaternions: four plain scalars side by side whose norm is 1 in all rows.
 
-    Raises OptionError where these overlap and names do not decide between them, and where columns
+    Raises OptionError if these overlap and names do not decide between them, and where columns
     with the names of a quaternion have another norm.
     """
     names = _plain_names(skeleton, own)

@@ -1,6 +1,6 @@
 """Positions of points and the root, and their derivatives, from known positions only.
 
-``places`` is (n_frames, n, 3), NaN where unknown; ``steps`` are the seconds from each frame to the
+``places`` is (n_frames, n, 3), NaN if unknown; ``steps`` are the seconds from each frame to the
 next, (n_frames - 1,), NaN across a break in time.
 """
 
@@ -14,17 +14,17 @@ from numpy.typing import DTypeLike
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import first_points
 from mcz.kinematics import point_names as names_of_points
-from mcz.kinematics.poses.conversions import from_matrices
-from mcz.kinematics.poses.motion_like import (
+from mcz.kinematics.frames import (
     Frames,
     MotionLike,
     as_type,
+    frame_poses_of,
     frame_range,
     joint_numbers,
-    poses_of,
     scale_to,
     values_of,
 )
+from mcz.kinematics.poses.conversions import from_matrices
 from mcz.model.clock import known_timeline
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import Joints, column_of, joint_list, signs_of
@@ -76,7 +76,7 @@ def positions(
     ``joints`` by index or name, or points by the names of ``point_names``; None: all points of
     ``point_names``. ``frames`` (a, b) or a slice. In length units of the skeleton, or in ``unit``:
     "mm", "cm", "m", "in", "ft". A point that depends on an invalid value is NaN. Raises
-    OptionError, and MotionError where the skeleton has no kinematics: its angle unit is unknown, or
+    OptionError, and MotionError if the skeleton has no kinematics: its angle unit is unknown, or
     all of its channels are plain scalars.
     """
     scale = scale_to(moving.skeleton, unit)
@@ -86,7 +86,7 @@ def positions(
 
 def _positions(moving: MotionLike, joints: Joints, span: tuple[int, int]) -> Floats:
     points = find_points(moving.skeleton, joints)
-    poses = poses_of(moving.skeleton)
+    poses = frame_poses_of(moving.skeleton)
     needed = poses.above(poses.joints_of(points))
     return poses.positions(values_of(moving, span, needed), points)
 
@@ -178,7 +178,7 @@ class Root:
         """Rotation of the root about the up axis, (n_frames,), in radians.
 
         0 in the rest pose, continuous over turns: the twist of the rotation. Raises OptionError
-        where the up axis is unknown.
+        if the up axis is unknown.
         """
         if not self.up_axis:
             raise OptionError(f"root {self.joint!r}: the up axis is unknown; set it with up=")
@@ -201,13 +201,13 @@ def root(
 ) -> Root:
     """World position and rotation of the root joint.
 
-    ``joint`` selects another than the first. Raises as ``positions``, and MotionError where the
+    ``joint`` selects another than the first. Raises as ``positions``, and MotionError if the
     skeleton has no joint.
     """
     skeleton, span = moving.skeleton, frame_range(moving, frames)
     scale = scale_to(skeleton, unit)
     (number,) = joint_numbers(skeleton, 0 if joint is None else joint)
-    poses = poses_of(skeleton)
+    poses = frame_poses_of(skeleton)
     values = values_of(moving, span, poses.above([number]))
     turns = from_matrices(poses.world(values, [number]), "quat")
     return Root(
@@ -221,7 +221,7 @@ def root(
 def velocities_of(places: Floats, steps: Floats) -> Floats:
     """The slope of the parabola through three frames; at an end or break, to the next frame.
 
-    NaN where a frame or both of its neighbors are unknown.
+    NaN if a frame or both of its neighbors are unknown.
     """
     before, after, first, last = _one_sided_slopes(places, steps)
     with np.errstate(invalid="ignore"):
@@ -233,7 +233,7 @@ def velocities_of(places: Floats, steps: Floats) -> Floats:
 def accelerations_of(places: Floats, steps: Floats) -> Floats:
     """Second derivative of that parabola; at an end or a break in time, the next frame's.
 
-    NaN where a frame is unknown or in a run of fewer than three.
+    NaN if a frame is unknown or in a run of fewer than three.
     """
     before, after, first, last = _one_sided_slopes(places, steps)
     with np.errstate(invalid="ignore"):

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mcz.model.numbers import printed, textgrids
 from mcz.model.numbers.grid import Grid
 from mcz.model.numbers.rules import (
     BASE_32,
@@ -28,11 +27,12 @@ from mcz.model.numbers.rules import (
     GridFlag,
     GridKind,
 )
+from mcz.model.numbers.text_grids import match_tokens, printed_shapes, too_long
 from mcz.model.numbers.tokens import TENS, Tokens, kernels
 from mcz.model.types import Bools, Floats, Ints
 
 if TYPE_CHECKING:
-    from mcz.model.numbers.survey_kernels import Survey
+    from mcz.model.numbers.token_kernels import Survey
 
 
 EXHAUSTIVE_TOKENS = 2**14  # up to so many tokens, all candidates are tried in order
@@ -55,7 +55,7 @@ def _survey(tokens: Tokens, n_counted: int) -> Survey:
     loops = _surveys()
     sizes = loops.MOST_DECIMALS + 1, loops.MOST_DIGITS + 1, loops.N_STYLES
     survey: Survey = loops.Survey(*(np.zeros(size, np.int64) for size in sizes))
-    loops.count(tokens.fields, _STEP, n_counted, survey)
+    loops.count_notations(tokens.fields, _STEP, n_counted, survey)
     return survey
 
 
@@ -138,7 +138,7 @@ def _styles(counts: Sequence[int]) -> tuple[int, int, int]:
 
 
 def _surveys() -> ModuleType:
-    return importlib.import_module("mcz.model.numbers.survey_kernels")
+    return importlib.import_module("mcz.model.numbers.token_kernels")
 
 
 def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
@@ -198,7 +198,7 @@ def _try_rule(tokens: Tokens, rule: Rule, spare: float) -> tuple[Ints, Bools] | 
     kind, digits, flags, _, _ = rule
     allowed = int(min(spare / _EXCEPTION_BITS, len(tokens))) + 1  # a loose bound: prices decide
     if kind in DECIMAL_KINDS:
-        ordinals, known, misses = textgrids.match(tokens, kind, digits, flags, allowed)
+        ordinals, known, misses = match_tokens(tokens, kind, digits, flags, allowed)
         return (ordinals, known) if misses <= allowed else None
     if _fewest_misses(tokens, rule) > allowed:
         return None
@@ -221,10 +221,10 @@ def _fewest_misses(tokens: Tokens, rule: Rule) -> int:
     """Count tokens that their shape alone excludes, to spare grids that are costly to try."""
     kind, digits, flags, _, style = rule
     if kind == GridKind.PRINTED:
-        return int(np.count_nonzero(~printed.plausible(tokens, style)))
-    bound = textgrids.match(tokens, kind, digits, flags)[2]
+        return int(np.count_nonzero(~printed_shapes(tokens, style)))
+    bound = match_tokens(tokens, kind, digits, flags)[2]
     if kind in CHECKED_KINDS and bound:
-        bound -= int(np.count_nonzero(textgrids.too_long(tokens)))
+        bound -= int(np.count_nonzero(too_long(tokens)))
     return bound
 
 

@@ -10,8 +10,11 @@ import numpy as np
 from construct import If, Int8ul, this
 
 from mcz.errors import FormatError, OptionError
-from mcz.model.numbers import printed, rules, textgrids
-from mcz.model.numbers.magnitudes import (
+from mcz.model.numbers import rules
+from mcz.model.numbers.rules import (
+    CHECKED_KINDS,
+    TEXT_KINDS,
+    GridKind,
     binary32_magnitudes,
     binary32_values,
     binary64_values,
@@ -22,7 +25,17 @@ from mcz.model.numbers.magnitudes import (
     vax_swap,
     vax_values,
 )
-from mcz.model.numbers.rules import CHECKED_KINDS, TEXT_KINDS, GridKind
+from mcz.model.numbers.text_grids import (
+    grid_texts,
+    match_tokens,
+    printed_magnitudes,
+    printed_shapes,
+    printed_texts,
+    printed_values,
+    text32_values,
+    token_ordinals32,
+    uncertain_tokens,
+)
 from mcz.model.numbers.tokens import NAN, TENS, Texts, Tokens, nearest
 from mcz.model.schema import FINITE, Adapted, Record
 from mcz.model.schema import field as record_field
@@ -103,13 +116,13 @@ class Grid:
             case GridKind.TEXT64 | GridKind.BINARY64:
                 values = binary64_values(magnitudes)
             case GridKind.TEXT32:
-                values = textgrids.text32_values(magnitudes)
+                values = text32_values(magnitudes)
             case GridKind.BINARY32:
                 values = binary32_values(magnitudes)
             case GridKind.VAX_F:
                 values = vax_values(magnitudes)
             case GridKind.PRINTED:
-                values = printed.values_of(self.digits, self.style, magnitudes)
+                values = printed_values(self.digits, self.style, magnitudes)
             case _:
                 values = np.multiply(magnitudes, self.scale, dtype=np.float64)
         negative = ordinals < 0
@@ -154,7 +167,7 @@ class Grid:
             case GridKind.VAX_F:
                 return vax_magnitudes(values)
             case GridKind.PRINTED:
-                return printed.magnitudes_of(self.digits, values)
+                return printed_magnitudes(self.digits, values)
             case _:
                 return scaled_magnitudes(values, self.scale, True, self.limit)
 
@@ -192,14 +205,14 @@ class Grid:
         self._check_text()
         if self.kind == GridKind.PRINTED:
             return self._printed_ordinals(tokens)
-        ordinals, known, _ = textgrids.match(tokens, self.kind, self.digits, self.flags)
+        ordinals, known, _ = match_tokens(tokens, self.kind, self.digits, self.flags)
         if self.kind not in CHECKED_KINDS:
             return ordinals, known
-        unsure = textgrids.uncertain(tokens, self.kind, self.digits, known)
+        unsure = uncertain_tokens(tokens, self.kind, self.digits, known)
         known |= unsure
         chosen = tokens[known]
         if self.kind == GridKind.TEXT32:
-            ordinals[known] = textgrids.token_ordinals32(chosen)
+            ordinals[known] = token_ordinals32(chosen)
         else:
             values = chosen.values()
             ordinals[known] = self.ordinals(values)[0]
@@ -211,7 +224,7 @@ class Grid:
 
     def _printed_ordinals(self, tokens: Tokens) -> tuple[Ints, Bools]:
         """``ordinals_of_tokens`` of a PRINTED grid: plausible tokens are printed, and compared."""
-        known = printed.plausible(tokens, self.style)
+        known = printed_shapes(tokens, self.style)
         ordinals = np.zeros(len(tokens), np.int64)
         chosen = tokens[known]
         values = chosen.values()
@@ -232,8 +245,8 @@ class Grid:
         ordinals = np.ascontiguousarray(ordinals, np.int64).ravel()
         if self.kind == GridKind.PRINTED:
             magnitudes = self.magnitudes(ordinals)
-            return printed.texts(self.digits, self.style, self.flags, magnitudes, ordinals < 0)
-        return textgrids.texts(
+            return printed_texts(self.digits, self.style, self.flags, magnitudes, ordinals < 0)
+        return grid_texts(
             self.kind, self.digits, self.flags, self.magnitudes(ordinals), ordinals < 0
         )
 

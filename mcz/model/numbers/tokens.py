@@ -30,7 +30,7 @@ _INF_TEXT = re.compile(rb"[-+]?(inf(inity)?|\d\.#inf\d*)", re.IGNORECASE)  # TEX
 
 def kernels() -> ModuleType:
     """The compiled loops, imported on first use."""
-    return importlib.import_module("mcz.model.numbers.kernels")
+    return importlib.import_module("mcz.model.numbers.decimal_kernels")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ class Tokens:
     text: NDArray[np.uint8]
     start: Ints
     stop: Ints
-    fields: Ints  # columns as in mcz.model.numbers.kernels
+    fields: Ints  # columns as in mcz.model.numbers.decimal_kernels
     known: list[Floats] = field(default_factory=list, repr=False)  # the values, once computed
 
     def __len__(self) -> int:
@@ -156,7 +156,7 @@ def scan(
     start = np.ascontiguousarray(start, np.int64)
     stop = np.ascontiguousarray(stop, np.int64)
     loops = kernels()
-    scanner = importlib.import_module("mcz.model.numbers.scan_kernels")
+    scanner = importlib.import_module("mcz.model.numbers.token_kernels")
     fields = np.empty((len(start), 3), np.int64)
     n_bad = scanner.scan(whole, start, stop, fields) if len(start) == len(stop) else scanner.OUTSIDE
     if n_bad == scanner.OUTSIDE:

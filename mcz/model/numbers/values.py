@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from mcz.kernels import SPARE, lacks_compiled_kernels
 from mcz.model.identity import IdentityCache
-from mcz.model.numbers import textgrids
 from mcz.model.numbers.grid import Grid, grid_blocks
-from mcz.model.numbers.magnitudes import POWERS
-from mcz.model.numbers.rules import DECIMAL_KINDS, MIN_POWER, GridKind
+from mcz.model.numbers.rules import DECIMAL_KINDS, MIN_POWER, POWERS, GridKind
+from mcz.model.numbers.text_grids import WIDEST, printed_exponents
 from mcz.model.numbers.tokens import TENS
 from mcz.model.types import Bools, Floats, Ints, Values
 
@@ -71,16 +70,16 @@ def print_values(
     beyond their grid, and where no product or quotient of tens is exact.
     """
     of_channels = print_rules(grids)
-    out = np.empty(values.size * textgrids.WIDEST + SPARE, np.uint8)
+    out = np.empty(values.size * WIDEST + SPARE, np.uint8)
     numbers = np.asarray(values, np.float64)
-    used = _kernels("print").fill(numbers, of_channels, TENS, POWERS, out, base, start, size)
+    used = _kernels("token").print_rows(numbers, of_channels, TENS, POWERS, out, base, start, size)
     return out[:used].copy()
 
 
 def print_rules(grids: Sequence[Grid]) -> Ints:
-    """The rules (channels, RULE_SIZE) of ``print_kernels``, whose last column it changes."""
+    """The rules (channels, RULE_SIZE) of ``print_rows``, which changes their last column."""
     rules = {grid: _print_rule(grid) for grid in dict.fromkeys(grids)}
-    size = _kernels("print").RULE_SIZE
+    size = _kernels("token").RULE_SIZE
     return np.array([rules[grid] for grid in grids], np.int64).reshape(-1, size)
 
 
@@ -89,7 +88,7 @@ def _print_rule(grid: Grid) -> tuple[int, ...]:
     loops = _kernels("value")
     if grid.kind not in DECIMAL_KINDS:
         return loops.OTHER, *[0] * 7
-    digits, *exponents = textgrids.exponents(grid.kind, grid.digits)
+    digits, *exponents = printed_exponents(grid.kind, grid.digits)
     trim = int(grid.kind != GridKind.FIXED)
     return digits, grid.digits, grid.limit, trim, *exponents, grid.flags, 0
 

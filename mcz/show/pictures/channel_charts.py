@@ -13,8 +13,8 @@ from mcz.errors import MczError, MotionError, OptionError
 from mcz.hints import Hint, Remark
 from mcz.kinematics.angles import Unwrapper
 from mcz.kinematics.chain import Floats
+from mcz.kinematics.frames import signal_of
 from mcz.kinematics.poses import velocities
-from mcz.kinematics.poses.motion_like import signal_of
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal
 from mcz.model.text_format import among, printable
 from mcz.show.pictures.canvases import Theme

@@ -16,7 +16,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.files.writing.atomic import replacing
 from mcz.hints import Hint, Remark
 from mcz.kinematics.chain import Floats
-from mcz.kinematics.poses.motion_like import Frames, MotionLike, frame_range
+from mcz.kinematics.frames import Frames, MotionLike, frame_range
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.clock import Timeline
 from mcz.model.types import Ints

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
-from mcz.model.numbers.scaling import Scaling
+from mcz.model.signal import Scaling
 from mcz.model.types import Items, Values
 from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT, Kind, Layout, ordered_fields
 from mcz.sources.c3d.parameters import (

@@ -16,7 +16,7 @@ import numpy as np
 from mcz.errors import MotionError
 from mcz.model.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
-from mcz.model.numbers.scaling import Scaling
+from mcz.model.signal import Scaling
 from mcz.sources.c3d.layout import Kind, Layout
 from mcz.sources.c3d.parameters import (
     BLOCK,

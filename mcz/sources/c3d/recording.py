@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mcz.model.motion import Source
-from mcz.model.numbers.scaling import Scaling
+from mcz.model.signal import Scaling
 from mcz.sources.c3d.layout import Layout, parse_layout
 from mcz.sources.c3d.parameters import (
     BLOCK,

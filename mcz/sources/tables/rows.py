@@ -297,7 +297,7 @@ def _move_pattern(pattern: Pattern, zeros: dict[int, bytes]) -> Pattern:
 
 def _shared_zeros(data: bytes, rows: Rows, columns: Sequence[int]) -> bytes:
     """The zeros that end all tokens of the columns, with the point where nothing is before them."""
-    from mcz.model.numbers import kernels
+    from mcz.model.numbers import decimal_kernels as kernels
 
     chosen = list(columns)
     start, stop = rows.start[:, chosen].ravel(), rows.stop[:, chosen].ravel()

@@ -30,7 +30,7 @@ ZEROS_IN = 8  # rows that show how many zeros end all times
 
 
 def stated_rate(text: str) -> Fraction | None:
-    """A rate as a header prints it; None where it is no positive number."""
+    """A rate as a header prints it; None if it is no positive number."""
     text = text.strip()
     if len(text) > 64 or not DECIMAL.fullmatch(text) or not 1e-9 <= float(text) <= 1e9:
         return None
@@ -69,7 +69,7 @@ def find_clock(
 
 
 def _decimals(tokens: Tokens) -> int:
-    from mcz.model.numbers import kernels
+    from mcz.model.numbers import decimal_kernels as kernels
 
     places = int((tokens.fields[:, 2] >> kernels.FRACTION_DIGITS).max())
     return min(places, MOST_DECIMALS)
@@ -104,7 +104,7 @@ def rate_of_times(
 
     Frames are counted by ``numbers``, those of the frames in the file, else by rows, else, where
     rows are missing that nothing counts, by the steps between the times, most of which are one
-    frame. ``half_digits`` are tried in order. Returns None where no count fits; and whether the
+    frame. ``half_digits`` are tried in order. Returns None if no count fits; and whether the
     rate is a round or a stated one.
     """
     if len(times) < 2 or not np.isfinite(times).all() or not times[-1] > times[0]:
@@ -164,7 +164,7 @@ def _counted_rates(
 
 
 def _mean_rate(times: Floats, count: Ints) -> Fraction:
-    """Frames a second on average; 0 where that is absurd."""
+    """Frames a second on average; 0 if that is absurd."""
     with np.errstate(over="ignore", divide="ignore"):
         mean = float(count[-1] / (times[-1] - times[0]))
     return Fraction(mean) if 1e-9 < mean < 1e9 else Fraction(0)
@@ -220,7 +220,7 @@ def frame_rate(frame_time: str) -> tuple[Fraction | None, bool]:
     A rate whose reciprocal rounds to the printed digits is taken for the true one, if it is an
     integer, or an integer divided by 1.001, or, where at least 6 more digits are printed than
     would tell such rates apart, one of at most 3 decimals; in this order. Otherwise it is the
-    reciprocal itself. None where the frame time is zero, negative, absurd or not a number.
+    reciprocal itself. None if the frame time is zero, negative, absurd or not a number.
     """
     if len(frame_time) > 64 or not DECIMAL.fullmatch(frame_time):
         return None, True
@@ -243,7 +243,7 @@ def frame_rate(frame_time: str) -> tuple[Fraction | None, bool]:
 
 
 def frame_time(rate: Fraction | None) -> str:
-    """The seconds a frame takes, as the shortest decimal of its binary64; 0 where unknown."""
+    """The seconds a frame takes, as the shortest decimal of its binary64; 0 if unknown."""
     return "0" if rate is None else repr(float(1 / rate))
 
 
@@ -254,7 +254,7 @@ SECOND = Fraction(1)
 class Times:
     """``signals``: one of times where there are some that no clock gives, named ``time``.
 
-    ``rate`` is None where times are not whole frames apart. ``exact``: it is round or stated.
+    ``rate`` is None if times are not whole frames apart. ``exact``: it is round or stated.
     ``note`` says why the signal has not the role of times. ``printed`` are the times of a clock.
     """
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from mcz.kernels import eight_bytes, kernel, put_eight_bytes, trailing_zeros
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
-from mcz.model.numbers.kernels import length, put
-from mcz.model.numbers.print_kernels import put_value
+from mcz.model.numbers.decimal_kernels import length, put
+from mcz.model.numbers.token_kernels import put_value
 from mcz.sources.text import BLANKS, FREE, MARKUP, WORDS, Items
 
 BLANK, QUOTE, COMMA, SEMICOLON, LESS = 0x20, 0x22, 0x2C, 0x3B, 0x3C
@@ -58,7 +58,7 @@ def _blanks(text: Bytes, at: int) -> int:
 
 
 def _number(text: Bytes, start: int, stop: int) -> int:
-    """The plain decimal integer text[start:stop]; -1 where it is anything else."""
+    """The plain decimal integer text[start:stop]; -1 if it is anything else."""
     if stop == start or stop - start > 15 or (text[start] == ZERO and stop > start + 1):
         return -1
     value = 0
@@ -152,7 +152,7 @@ def match_rows(
     """Match as many rows of one pattern as possible from offset ``at`` and row ``row`` on.
 
     ``cells``: what a token is. One of ``WORDS`` ends at a blank. Those of tables end at separators
-    and quotes, too: none is empty where ``FULL``, all but the first may be where ``BLANKS``, and
+    and quotes, too: none is empty if ``FULL``, all but the first may be where ``BLANKS``, and
     all where ``FREE``. One of ``MARKUP`` ends at a blank, quote or tag, and is not empty. Fills
     ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,). Returns the row and the
     offset of the first row that does not match, or for which there is no room.
@@ -237,9 +237,9 @@ def print_rows(
 ) -> tuple[int, int]:
     """Write rows of one pattern without padded columns to ``out``; returns rows and bytes written.
 
-    ``rules``, ``tens`` and ``powers`` are those of ``print_kernels.fill``; ``numbers`` are the
-    frame numbers. Stops at a row with a value that ``fill`` skips. Gaps and ``out`` have ``SPARE``
-    bytes more than are read or written.
+    ``rules``, ``tens`` and ``powers`` are those of ``token_kernels.print_rows``; ``numbers`` are
+    the frame numbers. Stops at a row with a value that ``print_rows`` skips. Gaps and ``out`` have
+    ``SPARE`` bytes more than are read or written.
     """
     gaps, gap_start, gap_stop, columns, _ = items
     at = 0

@@ -17,7 +17,7 @@ from mcz.codecs.coding.forms import BINARY32
 from mcz.errors import FormatError
 from mcz.kernels import lacks_compiled_kernels
 from mcz.model.numbers import Grid, GridKind, ordinals_of, values_of
-from mcz.model.numbers.magnitudes import POWERS
+from mcz.model.numbers.rules import POWERS
 from mcz.model.types import Bools, Floats, Ints
 
 OFFSET, SHIFT, RESTS = 1, 2, 4  # bits of ``parts``

@@ -1,4 +1,4 @@
-"""Loops over decimal numbers in text: compare them with a grid, print them.
+"""Kernels of decimal numbers in text: compare them with a grid, print them.
 
 A token is described by a row of three int64, which determines its text unless LONG:
 
