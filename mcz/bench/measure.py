@@ -268,9 +268,9 @@ def _explore(size: Callable[[float], float], settings: Settings, big: float, sma
                 break
             change = math.log(known[moved] / before)
             flat = flat + 1 if abs(change) < FLAT else 0
-            beyond = known[moved] > big if change > 0 else known[moved] < small
+            is_beyond = known[moved] > big if change > 0 else known[moved] < small
             setting = moved
-            if beyond and abs(change) > CLEAR:  # less may be a whim of the encoder
+            if is_beyond and abs(change) > CLEAR:  # less may be a whim of the encoder
                 break
     return known
 

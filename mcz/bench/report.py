@@ -253,8 +253,8 @@ def bench(
     """Measure the clips of ``paths``; raises OptionError for an unknown codec or no clip at all."""
     variants = variants_of(codecs)
     cases = cases_by_names(find_cases(paths, unit))
-    asked = peers.installed_peers() if with_peers else ()
-    clips = sweep.measure_all(runner, cases, variants, speeds=speeds, peers=asked)
+    peer_names = peers.installed_peers() if with_peers else ()
+    clips = sweep.measure_all(runner, cases, variants, speeds=speeds, peers=peer_names)
     outcome = Outcome(clips, figures=[partial(draw, clips)])
     for clip in clips:
         outcome.tables.extend(sweep.tables(clip))

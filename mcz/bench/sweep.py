@@ -100,7 +100,7 @@ def _end_slope(h0: float, h1: float, s0: float, s1: float) -> float:
 
 
 ZFP = "zfp, tolerance"
-AT_ERRORS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # cm, or length units where these are unknown
+AT_ERRORS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # cm, or length units if these are unknown
 AT_MSES = (0.1, 0.25, 0.5, 1.0, 2.0)
 AT_RATIOS = (20.0, 40.0, 60.0, 80.0, 120.0)
 
@@ -208,8 +208,8 @@ def measure_all(
             points = swept[task]
             params = points[len(points) // 2]["params"]
             timed[task] = Task("speeds", task.case, task.variant, tuple(params.items()))
-    asked = {case: Task("peers", case, arguments=peers) for case in cases.values() if peers}
-    outcomes = runner.run([*timed.values(), *asked.values()])
+    peer_tasks = {case: Task("peers", case, arguments=peers) for case in cases.values() if peers}
+    outcomes = runner.run([*timed.values(), *peer_tasks.values()])
     results = []
     for name, case in cases.items():
         curves = []
@@ -217,7 +217,7 @@ def measure_all(
             if task.case == case:
                 speed = outcomes.get(timed[task], {}) if task in timed else {}
                 curves.append(_curve(task.variant, swept[task], speed))
-        others = outcomes[asked[case]] if case in asked else []
+        others = outcomes[peer_tasks[case]] if case in peer_tasks else []
         loaded = load(case)
         motion = loaded.motion
         facts = (len(loaded.data), motion.n_frames, motion.signals[0].n_channels)

@@ -87,7 +87,7 @@ KINDS: Mapping[str, Kind] = {
 
 
 def perform(task: Task, kind: Kind) -> Any:
-    """The result of a task; ``{"error": ...}`` where the clip or a parameter is refused."""
+    """The result of a task; ``{"error": ...}`` if the clip or a parameter is refused."""
     try:
         with warnings.catch_warnings():
             # already given when the key was computed

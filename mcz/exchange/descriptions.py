@@ -130,16 +130,16 @@ def ro_crate(file: File, clips: Sequence[Clip]) -> JsonObject:
 
 
 def _clip_entity(identifier: str, clip: Clip) -> JsonObject:
-    said = clip.metadata
+    metadata = clip.metadata
     entity: JsonObject = {
         "@id": identifier,
         "@type": "CreativeWork",
         "name": clip.name,
-        "alternateName": said.get("title"),
-        "description": said.get("description"),
-        "dateCreated": said.get("date"),
-        "locationCreated": said.get("place"),
-        "license": said.get("licence"),
+        "alternateName": metadata.get("title"),
+        "description": metadata.get("description"),
+        "dateCreated": metadata.get("date"),
+        "locationCreated": metadata.get("place"),
+        "license": metadata.get("licence"),
     }
     return _filled(entity)
 

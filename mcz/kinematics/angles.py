@@ -41,7 +41,7 @@ class Unwrapper:
     """Removes whole turns from the rotation channels of a signal, given block after block.
 
     Rotation vectors and quaternions follow each other likewise, by the equivalents of their
-    rotations. Where the skeleton's angle unit is unknown, angles are not changed: the size of a
+    rotations. If the skeleton's angle unit is unknown, angles are not changed: the size of a
     turn is unknown.
     """
 
@@ -60,10 +60,10 @@ class Unwrapper:
 
     def __copy__(self) -> Unwrapper:
         """A copy that continues independently from the same row."""
-        made = object.__new__(Unwrapper)
-        made.__dict__.update(self.__dict__)
-        made._followers = [(columns, copy(follow)) for columns, follow in self._followers]
-        return made
+        copied = object.__new__(Unwrapper)
+        copied.__dict__.update(self.__dict__)
+        copied._followers = [(columns, copy(follow)) for columns, follow in self._followers]
+        return copied
 
     def __call__(self, values: Floats) -> Floats:
         """The next rows, (n_rows, n_channels), as a new array; values that are NaN stay NaN."""

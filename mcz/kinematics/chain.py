@@ -44,12 +44,12 @@ LEAST_FRAMES = 16
 class Link:
     """A joint as the chain needs it; vectors are along its own local axes unless noted.
 
-    ``change``: C_parent^-1 C, shape (3, 3, 1), None where it is the identity. ``offset``: from the
+    ``change``: C_parent^-1 C, shape (3, 3, 1), None if it is the identity. ``offset``: from the
     parent's origin, (3,), along the parent's W. ``parent_back``: C_parent^-1, or None. ``moves``
     and ``scales``: (component, column); ``turns``: (axis, column) in the order of multiplication
     from the right; the axis QUATERNION stands for the columns ``quaternion``, VECTOR for the
     columns ``vector``, each with the first of its columns. ``direction``: of the first tail, None
-    where it has no length.
+    if it has no length.
     """
 
     parent: int
@@ -97,7 +97,7 @@ class Link:
 class Pose:
     """Joint transforms of a block of F frames.
 
-    Of each joint ``origins`` has its position, (3, F) or (3, 1) where it is constant; ``axes`` its
+    Of each joint ``origins`` has its position, (3, F) or (3, 1) if it is constant; ``axes`` its
     local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
     along the parent's local axes before the parent's scale, (3, F) or (3, 1); ``spins`` the
     rotation axis in the world of each of its columns ``turning``, (3, F) or (3, 1), for a unit of a
@@ -113,7 +113,7 @@ class Pose:
 class Chain:
     """The kinematics of a skeleton, prepared once for all frames.
 
-    Raises MotionError where the skeleton has rotations and its angle unit is unknown, and where it
+    Raises MotionError if the skeleton has rotations and its angle unit is unknown, and if it
     has channels, but none of them moves a joint.
     """
 

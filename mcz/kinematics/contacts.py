@@ -61,7 +61,7 @@ class Contacts:
     """All contacts of a motion, joint by joint in the order of the skeleton, each in time order.
 
     ``joints`` are the examined joints, as ``Skeleton.addresses`` names them. ``up_axis`` is "x" to
-    "-z", and ``up_guessed`` where the skeleton does not state it; ``rate_assumed`` where
+    "-z", and ``up_guessed`` if the skeleton does not state it; ``rate_assumed`` if
     ``frame_rate`` is 120 because no rate is known. Raises MotionError if a run is of another
     joint or beyond the frames.
     """
@@ -104,7 +104,7 @@ def contacts(
 
     ``joints`` are the feet, by index or name; None takes feet by their names, ``LeftFoot``,
     ``ltoes`` and the like. The first point of a joint decides. An up axis or a frame rate that is
-    unknown is guessed, and marked in the result. Where a position is unknown, there is no contact.
+    unknown is guessed, and marked in the result. If a position is unknown, there is no contact.
     Each part between two breaks in time is examined separately.
 
     Raises MotionError if there is no such joint, no foot by name or no kinematics, and
@@ -200,9 +200,9 @@ class FootTracks:
     def guess_up_axis(self) -> str:
         """The axis along which the body is farthest from its feet, on average; "y" if none is."""
         with np.errstate(all="ignore"):
-            apart = self.body - self.feet
-            known = np.isfinite(apart).all(axis=2)
-            means = np.abs(apart[known].sum(axis=0))
+            differences = self.body - self.feet
+            known = np.isfinite(differences).all(axis=2)
+            means = np.abs(differences[known].sum(axis=0))
         return AXES[int(means.argmax())] if np.nanmax(means) > 0 else "y"
 
 

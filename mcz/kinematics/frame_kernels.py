@@ -71,7 +71,7 @@ def place_frames(
     """Write ``points`` of all frames to ``out`` (n_frames, n_points, 3), and axes to ``kept``.
 
     ``values`` (n_frames, n_channels); ``indices`` are the joints to place, parents before children.
-    ``kept`` (n_frames, n_joints, 3, 3), or (0, ...) where the axes are not needed.
+    ``kept`` (n_frames, n_joints, 3, 3), or (0, ...) if the axes are not needed.
     """
     n_joints = len(joints.parents)
     arm, origins, axes = np.empty(3), np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))

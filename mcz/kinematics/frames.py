@@ -335,7 +335,7 @@ def values_of(moving: MotionLike, frames: tuple[int, int], joints: Sequence[int]
 def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     """Factor from length units to ``unit`` (cm, m, mm ...); 1 if None.
 
-    Raises OptionError for another unit, and where the skeleton's is unknown.
+    Raises OptionError for another unit, and if the skeleton's is unknown.
     """
     if unit is None:
         return 1.0

@@ -50,7 +50,7 @@ def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) 
     length unit, as ``positions_of`` returns them, ``markers`` those of its virtual markers if
     known. NaN is an unknown position. Channels that move no target are 0.
 
-    Raises MotionError if the shapes do not match the skeleton, and where it has no kinematics;
+    Raises MotionError if the shapes do not match the skeleton, and if it has no kinematics;
     OptionError for virtual markers without a length unit.
     """
     targets = Targets(skeleton, markers=markers is not None)
@@ -102,7 +102,7 @@ class _Solution:
     def _accept(
         self, solution: tuple[Floats, Floats], limit: Floats | None, frames: Any = slice(None)
     ) -> None:
-        """Accept a solution for ``frames`` where its errors are within ``limit``."""
+        """Accept a solution for ``frames`` if its errors are within ``limit``."""
         columns, errors = solution
         accepted = np.ones(len(errors), np.bool_) if limit is None else errors <= limit
         self.columns[:, frames] = np.where(accepted, columns, self.columns[:, frames])
@@ -174,7 +174,7 @@ class _Solution:
         return max(1, len(self.targets)) * self.targets.lever**2
 
     def _smooth(self) -> None:
-        """Smooth the values towards their neighbor frames where distances remain, as with noise.
+        """Smooth the values towards their neighbor frames if distances remain, as with noise.
 
         The remaining distances estimate the noise of positions; ANGLE_SPREAD is the usual variation
         of human angles.

@@ -285,7 +285,7 @@ def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
     writer sets it. There is no source, since it could not be restored. An unknown position is 0
     under a mask. A motion of markers is returned unchanged.
 
-    Raises MotionError if the skeleton has no kinematics, OptionError for virtual markers where
+    Raises MotionError if the skeleton has no kinematics, OptionError for virtual markers if
     its length unit is unknown.
     """
     skeleton, first = motion.skeleton, motion.signals[0]

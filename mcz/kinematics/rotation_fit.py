@@ -1,6 +1,6 @@
 """Fit of a joint's rotation channels to a target rotation.
 
-One angle at a time, then damped Gauss-Newton steps, each frame with its own damping, where that
+One angle at a time, then damped Gauss-Newton steps, each frame with its own damping, if that
 converges slowly: at two axes that fall together.
 """
 
@@ -27,7 +27,7 @@ def set_turns(link: Link, moment: Floats, columns: Floats, radians: float) -> No
     """Set a joint's rotation channels so that R' ``moment`` has the greatest trace.
 
     ``moment`` has shape (3, 3, F) and is along the joint's own axes; ``columns``, (n_channels, F)
-    in source units, are written. Where ``moment`` is a rotation, R is the nearest to it. A
+    in source units, are written. If ``moment`` is a rotation, R is the nearest to it. A
     quaternion, or else a rotation vector, determines R alone.
     """
     if link.is_whole:
@@ -157,7 +157,7 @@ def _turn(axes: list[int], angles: Floats) -> tuple[Floats, Floats]:
 
 
 def _nearness(rotation: Floats, target: Floats) -> Floats:
-    """The trace of R' M, 3 where they are equal, (F,)."""
+    """The trace of R' M, 3 if they are equal, (F,)."""
     result: Floats = (rotation * target).sum(axis=(0, 1))
     return result
 

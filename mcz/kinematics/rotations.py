@@ -18,7 +18,7 @@ FULL_TURN = 2 * np.pi
 
 
 def matrices_of_vectors(vectors: Floats) -> Floats:
-    """The rotations by |v| about v, (3, 3, F); the identity where v is 0, NaN where not finite."""
+    """The rotations by |v| about v, (3, 3, F); the identity if v is 0, NaN if not finite."""
     angle = _length(vectors)
     # np.sinc is sin(pi x) / (pi x), and 1 at 0: no division by zero.
     first, half = np.sinc(angle / np.pi), np.sinc(angle / FULL_TURN)
@@ -40,7 +40,7 @@ def spins_of_vectors(vectors: Floats) -> Floats:
 
 
 def _length(vectors: Floats) -> Floats:
-    """|v|, also where its square would be 0 or infinite."""
+    """|v|, also if its square would be 0 or infinite."""
     result: Floats = np.hypot(np.hypot(vectors[0], vectors[1]), vectors[2])
     return result
 
@@ -115,7 +115,7 @@ def continuous(vectors: Floats, start: Floats | None = None) -> Floats:
     """The same rotations by vectors each near the one before, (3, F).
 
     v and v (1 + 2 pi n / |v|) turn alike. The first is the one nearest to ``start``, (3,), or the
-    shortest; each other is the one nearest to the vector before. Where v is 0, the axis of the
+    shortest; each other is the one nearest to the vector before. If v is 0, the axis of the
     vector before is used. Vectors that are not finite are skipped.
     """
     out = np.array(vectors, np.float64)
@@ -160,7 +160,7 @@ def euler_angles(turns: Floats, order: str) -> Floats:
 
     Of the two solutions of each frame, and of full turns, those nearest to the frame before are
     chosen. The first and second angle are solved after the third, so that all three restore the
-    matrix to rounding even in gimbal lock, where the third keeps the value of the frame before.
+    matrix to rounding even in gimbal lock, in which the third keeps the value of the frame before.
     """
     i, j, k = ("xyz".index(letter) for letter in order)
     sign = _sign(order)

@@ -176,7 +176,7 @@ FARTHER = 0.01  # the weight of targets below the next turning joint, if they co
 # ratio of the second singular value to the first: below it targets lie on one line, the roll is
 # open
 LINE = 1e-3
-FAR_LINE = 0.3  # the same where other joints may have bent the targets
+FAR_LINE = 0.3  # the same if other joints may have bent the targets
 TO_REST = 1e-6  # keeps channels that no target determines at rest
 LINE_TO_REST = 1e-2  # the same for targets on a line
 
@@ -208,7 +208,7 @@ class InitialPose:
         ]
 
     def _attach_targets(self, joint: int, pose: Pose, positions: Floats) -> AttachedTargets:
-        """The targets that turn with the joint, and farther ones where those are on a line."""
+        """The targets that turn with the joint, and farther ones if those are on a line."""
         origin = pose.origins[joint][:, 0]
         axes = pose.axes[joint][:, :, 0]
         below = [int(number) for number in self.targets.below[joint]]

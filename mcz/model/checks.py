@@ -23,18 +23,18 @@ class Rule(NamedTuple):
     form: Callable[[Any], Any]
 
 
-def check_fields(thing: object, rules: Mapping[str, Rule]) -> None:
+def check_fields(instance: object, rules: Mapping[str, Rule]) -> None:
     """Convert fields of a frozen dataclass by their rules; MotionError names the field."""
     for name, rule in rules.items():
-        value = getattr(thing, name)
+        value = getattr(instance, name)
         try:
             converted = rule.form(value)
         except (TypeError, ValueError, OverflowError, AttributeError):
-            kind = type(thing).__name__.lower()
-            shown = " ".join(reprlib.repr(value).split())  # in one line
-            raise MotionError(f"{kind}: {name} is {shown}; it must be {rule.words}") from None
+            kind = type(instance).__name__.lower()
+            text = " ".join(reprlib.repr(value).split())  # in one line
+            raise MotionError(f"{kind}: {name} is {text}; it must be {rule.words}") from None
         if converted is not value:
-            object.__setattr__(thing, name, converted)
+            object.__setattr__(instance, name, converted)
 
 
 def _text(value: object) -> str:
@@ -150,7 +150,7 @@ def optional(rule: Rule) -> Rule:
 def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
     """The rule of an array of types such as "f8", in the byte order and memory layout of C.
 
-    A masked array counts as one only where nothing is masked.
+    A masked array counts as one only if nothing is masked.
     """
 
     def form(value: object) -> Items:

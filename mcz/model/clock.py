@@ -49,7 +49,7 @@ class Timeline:
     def ticks(self) -> Ints | None:
         """Periods 1 / rate from the first frame to each frame, (n_frames,).
 
-        None where the rate is unknown or the times do not lie on such a grid.
+        None if the rate is unknown or the times do not lie on such a grid.
         """
         if self.rate is None or not len(self.times):
             return None
@@ -67,7 +67,7 @@ class Timeline:
 
     @cached_property
     def regular_times(self) -> Floats:
-        """``times`` moved to the multiples of 1 / rate where ``ticks`` exist."""
+        """``times`` moved to the multiples of 1 / rate if ``ticks`` exist."""
         if self.ticks is None or self.rate is None:
             return self.times
         return self.times[:1] + self.ticks / float(self.rate)
@@ -156,7 +156,7 @@ class Timed(Protocol):
 
 
 def times_index(signals: Sequence[Timed]) -> int | None:
-    """The index of the signal of times, None where there is none."""
+    """The index of the signal of times, None if there is none."""
     return next((k for k, signal in enumerate(signals) if signal.role == TIMES), None)
 
 
@@ -165,7 +165,7 @@ def unit_of_times(signal: Timed) -> str:
 
 
 def times_signal_fault(signal: Timed) -> str:
-    """The fault in the form of a signal of times, "" where there is none."""
+    """The fault in the form of a signal of times, "" if there is none."""
     channels = signal.channels or ()
     if signal.samples_per_frame != 1 or len(channels) != 1:  # ROLE-03
         return f"{len(channels)} channels of its own, {signal.samples_per_frame} rows a frame"
@@ -225,7 +225,7 @@ def times_fault(times: Values) -> str:
 
 
 def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
-    """The timeline of ``name``, a motion or clip; raises OptionError where it is unknown."""
+    """The timeline of ``name``, a motion or clip; raises OptionError if it is unknown."""
     if timeline is None:
         raise OptionError(
             "its frame rate is unknown, so its times are unknown too", clip=name, hint=Hint.RATE
@@ -234,7 +234,7 @@ def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
 
 
 class Numbered(NamedTuple):
-    """Frame numbers, and the time of the first frame, None where the numbers imply it."""
+    """Frame numbers, and the time of the first frame, None if the numbers imply it."""
 
     numbers: Ints
     first_time: float | None
@@ -243,7 +243,7 @@ class Numbered(NamedTuple):
 def numbering_of(timeline: Timeline, numbers: Ints, *, strict: bool = False) -> Numbered | None:
     """Frame numbers for the times of ``timeline`` at its rate, without a column.
 
-    ``numbers`` are kept where they can be, with ``strict`` always. None where frame numbers
+    ``numbers`` are kept if they can be, with ``strict`` always. None if frame numbers
     cannot give such times.
     """
     rate, times = timeline.rate, timeline.regular_times

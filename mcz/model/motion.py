@@ -152,13 +152,13 @@ class Motion:
     def _check_roles(self) -> None:
         """Give signals without a role theirs, and check the rules of SPEC.md on roles."""
         if any(signal.role is None for signal in self.signals):
-            given = (
+            signals = (
                 replace(signal, role="" if index else MOTION_ROLE)
                 if signal.role is None
                 else signal
                 for index, signal in enumerate(self.signals)
             )
-            object.__setattr__(self, "signals", tuple(given))
+            object.__setattr__(self, "signals", tuple(signals))
         roles = [signal.role for signal in self.signals]
         if MOTION_ROLE in roles[1:]:
             raise MotionError("only the first signal can be a motion", clip=self.name)
@@ -285,7 +285,7 @@ class Motion:
     def at_times(self, timeline: Timeline | None) -> Motion:
         """This motion at these times; None: at unknown ones.
 
-        Frame numbers are kept where they imply these times, and with a source, which may print
+        Frame numbers are kept if they imply these times, and with a source, which may print
         them; else they are changed, or the motion gets a signal ``time``.
         """
         motion = replace(self, first_time=None)
@@ -306,14 +306,14 @@ class Motion:
         others = (replace(s, role="") if s.role == TIMES else s for s in self.signals)
         return replace(self, signals=(*others, signal))
 
-    def with_signals(self, kept: Sequence[int]) -> Motion:
-        """The same motion with only the signals ``kept`` (indices), in the order given.
+    def with_signals(self, indices: Sequence[int]) -> Motion:
+        """The same motion with only the signals ``indices`` (indices), in the order given.
 
         Residuals of a signal that is left out lose their role.
         """
-        place = {old: new for new, old in enumerate(kept)}
+        place = {old: new for new, old in enumerate(indices)}
         signals = []
-        for signal in (self.signals[index] for index in kept):
+        for signal in (self.signals[index] for index in indices):
             if signal.of is not None:
                 target = place.get(signal.of)
                 signal = replace(signal, of=target, role="" if target is None else signal.role)

@@ -73,7 +73,7 @@ class Scaling:
         return scaled
 
     def stored(self, values: Values, numbers: Values) -> Values:
-        """Stored numbers of ``values``: ``numbers``, replaced where a value differs.
+        """Stored numbers of ``values``: ``numbers``, replaced if a value differs.
 
         The replacement is the number of the value or, among integers, the nearest one; NaN or 0
         if no number has this value.
@@ -189,11 +189,11 @@ class Signal:
     """Values of some channels over time.
 
     ``values`` has shape (n_frames * samples_per_frame, n_channels): binary64 in source units, or
-    int64 where every grid is INTEGER. ``grids`` has one grid a channel; ``grid_changes`` lists
+    int64 if every grid is INTEGER. ``grids`` has one grid a channel; ``grid_changes`` lists
     (row, channel, grid) from that row on. ``mask`` (bool, same shape) is True if the value is
     valid; None means valid everywhere. Stored coordinates of invalid values are kept.
 
-    Where the file stores words of a converter, ``scaling`` converts them: ``values`` are binary64
+    If the file stores words of a converter, ``scaling`` converts them: ``values`` are binary64
     in units, and ``stored`` are the numbers of the file; grids, grid changes, exceptions and
     ordinals refer to these. Elsewhere ``stored`` are the values.
 
@@ -384,7 +384,7 @@ class Signal:
         """The ordinal of every value, and whether it restores exactly this value.
 
         A binary grid has many NaNs, which ``values`` does not distinguish: given ``ordinals`` are
-        used where they still have the present value.
+        used if they still have the present value.
         """
         if self.scaling is not None:
             return self.as_stored().to_ordinals()
@@ -396,12 +396,12 @@ class Signal:
             block = np.ascontiguousarray(self.values[rows][:, columns])
             coded, on_grid = grid.ordinals(block)
             if self.ordinals is not None:
-                given = np.ascontiguousarray(self.ordinals[rows][:, columns])
-                meaning = grid.values(given)
+                stored = np.ascontiguousarray(self.ordinals[rows][:, columns])
+                meaning = grid.values(stored)
                 equal = (meaning.view(np.int64) == block.view(np.int64)) | (
                     np.isnan(meaning) & np.isnan(block)
                 )
-                coded, on_grid = (np.where(equal, given, coded), on_grid | equal)
+                coded, on_grid = (np.where(equal, stored, coded), on_grid | equal)
             ordinals[rows, columns], exact[rows, columns] = coded, on_grid
         return ordinals, exact
 

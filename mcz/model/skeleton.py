@@ -211,7 +211,7 @@ class Skeleton:
     """The joints of a clip, parents before children, and what their numbers mean.
 
     ``unit_cm`` is the length of one unit in centimeters, None while unknown; ``angle_unit`` is
-    "deg", "rad" or "" (unknown); ``up_axis`` and ``forward_axis``, where a
+    "deg", "rad" or "" (unknown); ``up_axis`` and ``forward_axis``, if a
     figure faces, are "x", "y", "z", "-x", "-y", "-z" or "" (unknown), not parallel; ``handedness``
     of the axes is "right", "left" or "" (unknown). Arithmetic takes no notice of these three.
     ``intrinsic``: the rotation channels of a joint apply about the axes that turn with it, as
@@ -317,7 +317,7 @@ class Skeleton:
         return [f"{name}.{channel.label}" for name, joint in joints for channel in joint.channels]
 
     def find(self, joint: int | str) -> int:
-        """The index of a joint given by index or by name, ``name[#n]`` where a name repeats.
+        """The index of a joint given by index or by name, ``name[#n]`` if a name repeats.
 
         Raises MotionError if there is no such joint.
         """

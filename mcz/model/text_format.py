@@ -21,7 +21,7 @@ _SHORT.maxtuple = _SHORT.maxlist = _SHORT.maxdict = 3
 
 
 def shown(name: str) -> str:
-    """A name in quotes, cut in the middle where it is long.
+    """A name in quotes, cut in the middle if it is long.
 
     >>> shown("walk"), len(shown("x" * 1000))
     ("'walk'", 60)
@@ -109,10 +109,10 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return " or ".join(repr(by_lower[one]) for one in matches)
 
 
-def brief(thing: Any) -> str:
+def brief(instance: Any) -> str:
     """A dataclass as its fields, of long ones the first items and their number."""
-    parts = (f"{f.name}={_value(getattr(thing, f.name))}" for f in fields(thing) if f.repr)
-    return f"{type(thing).__name__}({', '.join(parts)})"
+    parts = (f"{f.name}={_value(getattr(instance, f.name))}" for f in fields(instance) if f.repr)
+    return f"{type(instance).__name__}({', '.join(parts)})"
 
 
 def _value(value: Any) -> str:

@@ -63,7 +63,7 @@ def timing(kind: str, amount: int) -> Iterator[None]:
 
 
 def useful_threads(kind: str, amount: int, threads: int) -> int:
-    """``threads``, or 1 where this work takes less than ``LEAST_PARALLEL_SECONDS``."""
+    """``threads``, or 1 if this work takes less than ``LEAST_PARALLEL_SECONDS``."""
     return threads if _PACES.get(kind, inf) * amount >= LEAST_PARALLEL_SECONDS else 1
 
 

@@ -16,7 +16,7 @@ Floats: TypeAlias = NDArray[np.float64]
 Bools: TypeAlias = NDArray[np.bool_]
 
 Values: TypeAlias = NDArray[np.float64 | np.int64]
-"""Values of a signal: binary64, or int64 where grids are of integers."""
+"""Values of a signal: binary64, or int64 if grids are of integers."""
 
 Reals: TypeAlias = NDArray[np.floating]
 """Poses and positions as float64 or float32, as the caller chooses."""

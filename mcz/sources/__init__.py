@@ -45,8 +45,8 @@ _ASF_SECTION = re.compile(rb"(?m)^[ \t]*:(bonedata|hierarchy)\b")
 class Format:
     """A source format.
 
-    ``read(data, name)`` gives a Motion, a Skeleton where ``is_skeleton``, and takes the Skeleton or
-    None as a third argument where ``wants_skeleton``; it raises SourceError. ``write`` is its
+    ``read(data, name)`` gives a Motion, a Skeleton if ``is_skeleton``, and takes the Skeleton or
+    None as a third argument if ``wants_skeleton``; it raises SourceError. ``write`` is its
     inverse; it raises MotionError or FormatError. ``join_notes`` is the inverse of the notes' cut.
     ``arrive(lines, skeleton)`` reads what comes line by line, None if the format cannot.
     ``bones(data, whole=False)``: of a format that wants a skeleton, how many values each bone of
@@ -210,21 +210,22 @@ FORMATS: dict[str, Format] = {
 def format_of(path: str | Path, data: bytes | None = None) -> Format:
     """The format of a file by its suffix, in any case; raises SourceError.
 
-    ``data`` are the bytes of the file: where they begin as those of another format do, it is that;
+    ``data`` are the bytes of the file: if they begin as those of another format do, it is that;
     but rows of numbers alone, as in any CSV, tell nothing.
     """
     suffix = Path(path).suffix.lower()
     own = next((f for f in FORMATS.values() if suffix in f.suffixes), None)
-    found = () if data is None else likely_formats(data)
+    likely = () if data is None else likely_formats(data)
     if own is None:
         known = ", ".join(dict.fromkeys(s for f in FORMATS.values() for s in f.suffixes))
-        looks = f"; it looks like {FORMATS[found[0]].suffix}" if found and found[0] != "csv" else ""
+        is_unlike = bool(likely) and likely[0] != "csv"
+        looks = f"; it looks like {FORMATS[likely[0]].suffix}" if is_unlike else ""
         hint = Hint.BLENDER if suffix in BLENDER_SUFFIXES else None
         message = f"no source format has the suffix {suffix!r}, but {known}{looks}"
         raise SourceError(message, path=path, hint=hint)
-    if not found or found[0] == "csv" or any(suffix in FORMATS[n].suffixes for n in found):
+    if not likely or likely[0] == "csv" or any(suffix in FORMATS[n].suffixes for n in likely):
         return own
-    return FORMATS[found[0]]
+    return FORMATS[likely[0]]
 
 
 def has_known_suffix(path: str | Path) -> bool:
@@ -249,7 +250,7 @@ def wants_skeleton(path: str | Path, data: bytes | None = None) -> bool:
 def likely_formats(data: bytes) -> tuple[str, ...]:
     """The names of the formats whose files begin as ``data`` does, the likeliest first.
 
-    Where a suffix has several formats, it is the one that the content has. What tells a text from
+    If a suffix has several formats, it is the one that the content has. What tells a text from
     others stands in its first ``HEAD_BYTES``.
     """
     head = data[:HEAD_BYTES]
@@ -295,8 +296,8 @@ def recording_of(source: Source | None) -> Any:
 
 def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | None:
     """``source``, a C3D, with other scales of analog channels; None if it states none."""
-    found: Source | None = _of("c3d.recording", "with_analog_scales")(source, scales)
-    return found
+    scaled: Source | None = _of("c3d.recording", "with_analog_scales")(source, scales)
+    return scaled
 
 
 def arrays_of(source: Source | None, signals: Sequence[str]) -> list[JsonObject] | None:

@@ -269,7 +269,7 @@ class Cells:
                 self._print_rows(signal.values, slice(row, min(row + step, last)), grids)
         self._print_exceptions(signal)
         if numbers is not None:
-            texts = INTEGERS.texts(numbers - (numbers < 0))  # -1 - |n| where n is negative
+            texts = INTEGERS.texts(numbers - (numbers < 0))  # -1 - |n| if n is negative
             self.start[:, -1] = texts.offsets[:-1] + self._total
             self.size[:, -1] = np.diff(texts.offsets)
             self._append(texts.buffer)
@@ -343,8 +343,8 @@ class Cells:
             raise FormatError("an exception is no number, or lies outside of the signal")
         now, then = signal.values[rows, columns].astype(np.float64), tokens.values()
         same = (now.view(np.int64) == then.view(np.int64)) | (np.isnan(now) & np.isnan(then))
-        kept = np.flatnonzero(same)  # AMC-06
-        self.set(rows[kept], columns[kept], [exceptions.texts[k] for k in kept])
+        valid = np.flatnonzero(same)  # AMC-06
+        self.set(rows[valid], columns[valid], [exceptions.texts[k] for k in valid])
 
 
 def _grid_runs(signal: Signal) -> Iterator[tuple[int, int, list[Grid]]]:

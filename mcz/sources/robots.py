@@ -25,7 +25,7 @@ NORM_ERROR = 2e-3  # of a printed unit quaternion
 
 @dataclass(frozen=True, slots=True)
 class RobotLayout:
-    """Columns of a robot: ``quaternion`` is "xyzw", "wxyz" or "" where no source states it."""
+    """Columns of a robot: ``quaternion`` is "xyzw", "wxyz" or "" if no source states it."""
 
     source: str
     quaternion: str
@@ -44,7 +44,7 @@ def robot_layouts() -> dict[str, RobotLayout]:
 
 
 def with_robot_layout(motion: Motion, name: str) -> Motion | None:
-    """``motion`` with the column names of a layout; None where the number of columns is another.
+    """``motion`` with the column names of a layout; None if the number of columns is another.
 
     The columns are the joints alone, or the root and the joints.
     """
@@ -58,7 +58,7 @@ def with_robot_layout(motion: Motion, name: str) -> Motion | None:
 
 
 def without_robot(metadata: Mapping[str, str]) -> dict[str, str]:
-    """``metadata`` without the layout that was recognized, where another source names columns."""
+    """``metadata`` without the layout that was recognized, if another source names columns."""
     notes = metadata.get("source-note", "").split(SEPARATOR)
     note = SEPARATOR.join(note for note in notes if not note.startswith(NOTE))
     others = {k: text for k, text in metadata.items() if k not in ("source-note", "x-robot")}
@@ -100,7 +100,7 @@ def _quaternion_order(values: Values) -> str:
 
 
 def _skeleton(joints: Sequence[str], order: str) -> Skeleton:
-    """Plain scalars: a joint for each part of the root, where there is one, and for each joint."""
+    """Plain scalars: a joint for each part of the root, if there is one, and for each joint."""
     root = [("root x", "m"), ("root y", "m"), ("root z", "m")] if order else []
     root += [(f"root q{part}", "") for part in order]
     columns = [*root, *((name, "rad") for name in joints)]

@@ -53,14 +53,14 @@ NONE = Fraction(0)
 
 
 class Restated(NamedTuple):
-    """The rate that a template states, 0 where that is none, and one that states another rate."""
+    """The rate that a template states, 0 if that is none, and one that states another rate."""
 
     rate: Fraction
     template: bytes
 
 
 def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
-    """A template of BVH at another rate; None where it states none."""
+    """A template of BVH at another rate; None if it states none."""
     fields = parse(Template, template, WHERE, {"runs": MAX_RUNS})
     parts = [bytes(part) for part in fields.header]
     match = _FRAME_TIME.search(parts[-1]) if parts else None
@@ -73,14 +73,14 @@ def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
 
 
 def restate_c3d(template: bytes, rate: Fraction) -> Restated | None:
-    """A template of C3D at another rate; None where it states none."""
+    """A template of C3D at another rate; None if it states none."""
     fields = parse(C3dTemplate, template, WHERE)
     head = _restated_head(fields, rate)
     return head and Restated(head.rate, build(replace(fields, head=head.template), WHERE))
 
 
 def restate_outputs(template: bytes, rate: Fraction) -> Restated | None:
-    """A template of C3D with outputs of models at another rate; None where it states none."""
+    """A template of C3D with outputs of models at another rate; None if it states none."""
     fields = parse(C3dOutputsTemplate, template, WHERE)
     head = _restated_head(fields.file, rate)
     if head is None:
@@ -90,7 +90,7 @@ def restate_outputs(template: bytes, rate: Fraction) -> Restated | None:
 
 
 def _restated_head(shared: C3dTemplate, rate: Fraction) -> Restated | None:
-    """The head of a C3D at another rate, as it is where that cannot be stated."""
+    """The head of a C3D at another rate, as it is if that cannot be stated."""
     head = bytearray(shared.head)
     try:
         order, start = find_parameters(bytes(head))
@@ -116,7 +116,7 @@ def _restated_head(shared: C3dTemplate, rate: Fraction) -> Restated | None:
 
 
 def restate_table(template: bytes, rate: Fraction) -> Restated | None:
-    """A template of a table at another rate; None where neither a clock nor a header states one."""
+    """A template of a table at another rate; None if neither a clock nor a header states one."""
     fields = parse(TableTemplate, template, WHERE, {"runs": MAX_RUNS})
     first = next((section for section in fields.sections if 0 in section.signals), None)
     if first is None:
@@ -156,7 +156,7 @@ def _header_rate(section: SectionFields) -> Fraction | None:
 def _in_header(header: bytes, factor: Fraction) -> bytes:
     """``header`` with all rates of the recording that it states multiplied."""
     patterns = _MOTIVE, _VICON, _MVNX
-    places = [found.span(1) for pattern in patterns for found in pattern.finditer(header)]
+    places = [match.span(1) for pattern in patterns for match in pattern.finditer(header)]
     keys = _TRC_KEYS.search(header)
     if keys is not None:
         values = [match.span() for match in _WORDS.finditer(header, *keys.span(2))]
@@ -172,9 +172,9 @@ def _in_header(header: bytes, factor: Fraction) -> bytes:
 
 
 def _scale_clock(clock: Clock, factor: Fraction) -> ClockFields | None:
-    """A clock whose times are divided by ``factor``; None where its terms are too large.
+    """A clock whose times are divided by ``factor``; None if its terms are too large.
 
-    It prints more decimals, up to ``DECIMALS``, where the times need them.
+    It prints more decimals, up to ``DECIMALS``, if the times need them.
     """
     step = Fraction(clock.numerator, clock.denominator) / factor
     half = Fraction(1, 2)  # that rounds to the nearest time; an exact clock needs none
@@ -191,7 +191,7 @@ def _scale_clock(clock: Clock, factor: Fraction) -> ClockFields | None:
 
 
 def _like(old: bytes, number: Fraction, means_it: Callable[[str], bool]) -> bytes:
-    """``number`` with the decimals of ``old``, or more where it takes more; b"": none will do."""
+    """``number`` with the decimals of ``old``, or more if it takes more; b"": none will do."""
     places = len(old.partition(b".")[2]) if re.fullmatch(rb"[0-9]*\.?[0-9]*", old) else 0
     texts = (f"{float(number):.{digits}f}" for digits in range(places, MOST_DECIMALS))
     return next((text.encode() for text in texts if float(text) and means_it(text)), b"")

@@ -28,7 +28,7 @@ def from_c3d(reader: Reader, *, name: str = "motion") -> Motion:
     """The motion in the file of a ``c3d.Reader``, or in the output of a ``c3d.Writer``.
 
     It has all contents of the file, with its source. Raises SourceError for a malformed C3D,
-    OptionError where the file of the reader is closed.
+    OptionError if the file of the reader is closed.
     """
     if hasattr(reader, "read_frames"):
         try:
@@ -50,7 +50,7 @@ def to_c3d(motion: Motion) -> Reader:
     """``motion`` as a ``c3d.Reader``; needs c3d (``mcz[c3d]``).
 
     It reads the C3D file of the motion, its source's if it has one, from memory; its ``to_writer``
-    allows changes. Raises MotionError where c3d cannot read that file, and as ``mcz.convert(motion,
+    allows changes. Raises MotionError if c3d cannot read that file, and as ``mcz.convert(motion,
     "c3d")``.
     """
     c3d, data = import_extra("c3d", "c3d"), c3d_bytes(motion)
@@ -61,7 +61,7 @@ def to_c3d(motion: Motion) -> Reader:
 
 
 def as_c3d_motion(motion: Motion) -> Motion:
-    """``motion`` itself where its source is a C3D, else its points as markers."""
+    """``motion`` itself if its source is a C3D, else its points as markers."""
     if motion.source is not None and motion.source.format in (FORMAT, OUTPUTS_FORMAT):
         return motion
     return convert(motion, "c3d")
@@ -85,7 +85,7 @@ def from_ezc3d(c3d: object, *, name: str = "motion") -> Motion:
     It is the motion in the file that ezc3d writes, with its source. If points or analog samples are
     numbers that such a file would round to binary32, filtered ones for example, they are kept, but
     not the source, events and parameters; the ``source-note`` of the metadata mentions it. Raises
-    OptionError where ezc3d cannot write the file, and SourceError.
+    OptionError if ezc3d cannot write the file, and SourceError.
     """
     if not hasattr(c3d, "write"):
         raise OptionError(f"{type(c3d).__name__} is not an ezc3d.c3d; to read a file, use mcz.read")
@@ -110,7 +110,7 @@ def to_ezc3d(motion: Motion) -> c3d:
 
     It has the contents of the C3D file of the motion (``mcz.to_c3d``), with points and analog
     samples in binary64; ezc3d writes them as binary32. Unknown values are NaN. Raises MotionError
-    where ezc3d cannot read that file, and as ``mcz.convert(motion, "c3d")``.
+    if ezc3d cannot read that file, and as ``mcz.convert(motion, "c3d")``.
     """
     ezc3d = import_extra("ezc3d", "ezc3d")
     plain = as_c3d_motion(motion)
@@ -119,10 +119,10 @@ def to_ezc3d(motion: Motion) -> c3d:
         path = Path(folder, "motion.c3d")
         path.write_bytes(data)
         try:
-            made = ezc3d.c3d(str(path))
+            file = ezc3d.c3d(str(path))
         except REFUSED as error:
             raise MotionError(f"ezc3d cannot read it: {error}", clip=motion.name) from error
-    arrays = _arrays_by_role(made, FORMATS["c3d"].read(data, motion.name))
+    arrays = _arrays_by_role(file, FORMATS["c3d"].read(data, motion.name))
     for signal in plain.signals:
         if signal.role in arrays:
             array, chosen = arrays[signal.role]
@@ -134,7 +134,7 @@ def to_ezc3d(motion: Motion) -> c3d:
                     clip=motion.name,
                 )
             array[chosen] = values.reshape(there.shape)
-    return made
+    return file
 
 
 def _arrays_by_role(data: c3d, motion: Motion) -> RoleArrays:

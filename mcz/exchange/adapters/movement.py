@@ -34,7 +34,7 @@ SLACK = 1e-3  # greatest deviation of a time, in frames
 def to_movement(motion: Motion, *, unit: str | None = None) -> Dataset:
     """The points of a motion as a poses dataset of ``movement``; needs xarray (``mcz[xarray]``).
 
-    ``position`` (time, space, keypoints, individuals) in length units or ``unit``, NaN where
+    ``position`` (time, space, keypoints, individuals) in length units or ``unit``, NaN if
     unknown; ``confidence`` is the motion's if it has one, else 1, and 0 where a point is unknown.
     Times are those of ``mcz.times``, frames from 0 on if unknown. Points called
     ``individual:keypoint`` are individuals, if all of these have the same keypoints; otherwise
@@ -57,7 +57,7 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Dataset:
     length = unit or next((name for name, cm in UNIT_CM.items() if cm == unit_cm), "")
     facts |= {"length_unit": length} if length else {}
     facts |= {"up_axis": motion.skeleton.up_axis} if motion.skeleton.up_axis else {}
-    made: Dataset = xarray.Dataset(
+    dataset: Dataset = xarray.Dataset(
         {
             "position": (DIMS, places.transpose(0, 3, 2, 1)),
             "confidence": (
@@ -73,7 +73,7 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Dataset:
         },
         facts,
     )
-    return made
+    return dataset
 
 
 def from_movement(
@@ -107,8 +107,8 @@ def from_movement(
         sure = _ordered(dataset["confidence"], (DIMS[0], *DIMS[2:])).values.transpose(0, 2, 1)
         if np.isfinite(sure).any():
             of_points = tuple(Channel("", each) for each in names)
-            made = _signal(sure.reshape(len(sure), -1), CONFIDENCE, of_points)
-            signals.append(replace(made, role=CONFIDENCE))
+            signal = _signal(sure.reshape(len(sure), -1), CONFIDENCE, of_points)
+            signals.append(replace(signal, role=CONFIDENCE))
     times = np.asarray(position["time"].values, np.float64)
     rate, numbers = _frames(dataset, times, name)
     facts = dataset.attrs
@@ -145,8 +145,8 @@ def _ordered(array: DataArray, dims: tuple[str, ...]) -> DataArray:
     """The array with its axes in this order; raises OptionError for other axes."""
     array = array.rename({old: new for old, new in SINGULAR.items() if old in array.dims})
     if set(array.dims) != set(dims):
-        shown = ", ".join(map(str, array.dims))
-        raise OptionError(f"{array.name} is along {shown}, not {', '.join(dims)}")
+        dims_text = ", ".join(map(str, array.dims))
+        raise OptionError(f"{array.name} is along {dims_text}, not {', '.join(dims)}")
     for dim in dims:
         if dim not in array.coords:
             raise OptionError(f"{array.name} has no coordinates along {dim}")
@@ -154,7 +154,7 @@ def _ordered(array: DataArray, dims: tuple[str, ...]) -> DataArray:
 
 
 def _signal(values: Values, name: str, channels: tuple[Channel, ...] | None) -> Signal:
-    """Values on the grid of their type, invalid where they are NaN."""
+    """Values on the grid of their type, invalid if they are NaN."""
     kind = GridKind.BINARY32 if values.dtype == np.float32 else GridKind.BINARY64
     known = np.isfinite(values)
     return Signal(

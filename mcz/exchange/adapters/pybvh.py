@@ -70,7 +70,7 @@ def to_pybvh(motion: Motion) -> Bvh:
     """``motion`` as a ``pybvh.Bvh``; needs pybvh (``mcz[pybvh]``).
 
     Angles in radians are kept, those in degrees are converted; another skeleton becomes joints of
-    BVH first, as in ``mcz.convert``. Raises MotionError where pybvh cannot hold it: unknown values,
+    BVH first, as in ``mcz.convert``. Raises MotionError if pybvh cannot hold it: unknown values,
     several roots, joints that move relative to their parent, markers, signals other than the
     motion.
     """
@@ -79,23 +79,23 @@ def to_pybvh(motion: Motion) -> Bvh:
     tree = _Tree(motion)
     order = list(tree.depth_first())
     nodes: list[BvhJoint] = []
-    made: dict[int, BvhJoint] = {}
+    by_joint: dict[int, BvhJoint] = {}
     angles = np.empty((motion.n_frames, len(order), 3))
     for number, joint in enumerate(order):
         axes, angles[:, number] = tree.turns(joint)
-        parent = made.get(tree.joints[joint].parent)
+        parent = by_joint.get(tree.joints[joint].parent)
         name = tree.names[joint]
         offset = np.array(tree.offsets[joint])
         if parent is None:
-            made[joint] = pybvh.bvhnode.BvhRoot(name, offset, rot_channels=axes)
+            by_joint[joint] = pybvh.bvhnode.BvhRoot(name, offset, rot_channels=axes)
         else:
-            made[joint] = pybvh.bvhnode.BvhJoint(name, offset, axes, parent=parent)
-            parent.children = [*parent.children, made[joint]]
-        nodes.append(made[joint])
+            by_joint[joint] = pybvh.bvhnode.BvhJoint(name, offset, axes, parent=parent)
+            parent.children = [*parent.children, by_joint[joint]]
+        nodes.append(by_joint[joint])
         for at, tail in enumerate(tree.joints[joint].tails):
             end = f"EndSite{name}" + (f"#{at}" if at else "")  # the names that pybvh uses
-            site = pybvh.bvhnode.BvhEndSite(end, np.array(tail), made[joint])
-            made[joint].children = [*made[joint].children, site]
+            site = pybvh.bvhnode.BvhEndSite(end, np.array(tail), by_joint[joint])
+            by_joint[joint].children = [*by_joint[joint].children, site]
             nodes.append(site)
     up = motion.skeleton.up_axis or "auto"
     return pybvh.Bvh(

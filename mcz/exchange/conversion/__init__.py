@@ -29,16 +29,16 @@ PRINTED = Grid(GridKind.FIXED, 6)  # of computed points: far below noise
 
 
 def to_trc(motion: Motion) -> Motion:
-    """The points as markers of their names, in mm where the length unit is known.
+    """The points as markers of their names, in mm if the length unit is known.
 
     A motion of markers is returned unchanged.
     """
-    made = to_c3d(motion)
-    signal = made.signals[0]
+    converted = to_c3d(motion)
+    signal = converted.signals[0]
     if signal is motion.signals[0]:
-        return replace(made, signals=(signal,))
+        return replace(converted, signals=(signal,))
     signal = replace(signal, grids=(PRINTED,) * signal.n_channels, grid_changes=(), ordinals=None)
-    return replace(made, signals=(signal,))
+    return replace(converted, signals=(signal,))
 
 
 def to_storage(motion: Motion) -> Motion:
@@ -56,23 +56,23 @@ MM_PER_CM = 10.0
 
 
 def to_c3d(motion: Motion) -> Motion:
-    """The points as markers of their names, in mm where the length unit is known.
+    """The points as markers of their names, in mm if the length unit is known.
 
     A motion of markers is returned unchanged. A point with an unknown position is invalid.
     """
-    made = in_positions(motion)
+    converted = in_positions(motion)
     unit_cm = motion.skeleton.unit_cm
-    if made is motion or unit_cm is None:
-        return replace(made, metadata=motion.metadata)
+    if converted is motion or unit_cm is None:
+        return replace(converted, metadata=motion.metadata)
     with np.errstate(over="ignore"):
-        values = np.asarray(made.signals[0].values, np.float64) * (unit_cm * MM_PER_CM)
+        values = np.asarray(converted.signals[0].values, np.float64) * (unit_cm * MM_PER_CM)
     if np.isinf(values).any():
         raise MotionError("a position in mm exceeds float64", clip=motion.name)
-    signal = replace(made.signals[0], values=values)
+    signal = replace(converted.signals[0], values=values)
     return replace(
-        made,
-        skeleton=replace(made.skeleton, unit_cm=MM_CM),
-        signals=(signal, *made.signals[1:]),
+        converted,
+        skeleton=replace(converted.skeleton, unit_cm=MM_CM),
+        signals=(signal, *converted.signals[1:]),
         metadata=motion.metadata,
     )
 
@@ -122,8 +122,9 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     timeline = motion.timeline
     if timeline is not None and FORMATS[to].is_table:  # prints as the source
         timeline = Timeline(timeline.times, timeline.rate)
-    made = replace(TARGETS[to](keep_supported_signals(motion, to)), source=None).at_times(timeline)
-    return drop_time_signal(made, to) if to in COUNTING else made
+    converted = TARGETS[to](keep_supported_signals(motion, to))
+    converted = replace(converted, source=None).at_times(timeline)
+    return drop_time_signal(converted, to) if to in COUNTING else converted
 
 
 def converted_files(

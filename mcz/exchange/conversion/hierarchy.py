@@ -64,8 +64,8 @@ def to_bvh(motion: Motion) -> Motion:
             name = f"{joint.name} end {number}"
             kinds = tuple(Channel(kind) for kind in POSITION_KINDS)
             joints.append(Joint(name, numbers[index], channels=kinds))
-    made = np.stack(columns, axis=1) if columns else np.zeros((len(values), 0))
-    return _computed_motion(motion, joints, made)
+    values_of_bvh = np.stack(columns, axis=1) if columns else np.zeros((len(values), 0))
+    return _computed_motion(motion, joints, values_of_bvh)
 
 
 def _computed_motion(motion: Motion, joints: list[Joint], values: Floats) -> Motion:
@@ -313,7 +313,7 @@ class _Bones:
         return name
 
     def _offset(self, index: int) -> Vector:
-        """The joint's offset; MotionError where position channels change it over time."""
+        """The joint's offset; MotionError if position channels change it over time."""
         joint = self.skeleton.joints[index]
         if joint.parent < 0 or not any(c.kind in POSITION_KINDS for c in joint.channels):
             return joint.offset

@@ -84,8 +84,8 @@ def _acclaim_names(motion: Motion) -> Iterator[str]:
     bones = [joint.name for joint in motion.skeleton.joints if joint.parent >= 0]
     odd = [name for name in bones if not name or any(c <= " " or c in "()" for c in name)]
     if odd:
-        shown = ", ".join(map(repr, odd[:MOST_NAMES])) + (" ..." if len(odd) > MOST_NAMES else "")
-        yield f"ASF cannot hold the joint names {shown}: they have _ instead"
+        names = ", ".join(map(repr, odd[:MOST_NAMES])) + (" ..." if len(odd) > MOST_NAMES else "")
+        yield f"ASF cannot hold the joint names {names}: they have _ instead"
 
 
 def text_column_note(metadata: Mapping[str, str]) -> Iterator[str]:

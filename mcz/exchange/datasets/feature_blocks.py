@@ -61,10 +61,10 @@ class MemoryCache:
 
     def get(self, key: str) -> Arrays | None:
         with self._lock:
-            found = self._held.get(key)
-            if found is not None:
+            arrays = self._held.get(key)
+            if arrays is not None:
                 self._held.move_to_end(key)
-            return found
+            return arrays
 
     def put(self, key: str, arrays: Arrays) -> None:
         size = size_of(arrays)
@@ -206,7 +206,7 @@ class Blocks:
             yield self._block(member, number)
 
     def block_size(self, member: Member) -> int:
-        """Frames of a block: all of a clip where a field cannot be computed for fewer."""
+        """Frames of a block: all of a clip if a field cannot be computed for fewer."""
         return max(1, member.n_frames) if self._recipe.is_whole else BLOCK
 
     def _block(self, member: Member, number: int) -> Arrays:
@@ -270,11 +270,11 @@ class _Moments(NamedTuple):
         assert isinstance(other, _Moments)
         counts = self.counts + other.counts
         share = other.counts / np.maximum(counts, 1)
-        apart = other.means - self.means
+        difference = other.means - self.means
         return _Moments(
             counts,
-            self.means + apart * share,
-            self.squares + other.squares + apart**2 * self.counts * share,
+            self.means + difference * share,
+            self.squares + other.squares + difference**2 * self.counts * share,
         )
 
     @property
@@ -296,11 +296,11 @@ def statistics_of(blocks: Blocks, members: Iterable[Member]) -> dict[str, FieldS
     members = list(members)
     text = "statistics " + " ".join(map(blocks.key, members))
     key = hashlib.sha256(text.encode()).hexdigest()[:32]
-    kept = blocks.cache.get(key)
-    if kept is None:
-        kept = _statistics_arrays(_compute(blocks, members))
-        blocks.cache.put(key, kept)
-    arrays = {name: np.asarray(array, np.float64) for name, array in kept.items()}
+    cached = blocks.cache.get(key)
+    if cached is None:
+        cached = _statistics_arrays(_compute(blocks, members))
+        blocks.cache.put(key, cached)
+    arrays = {name: np.asarray(array, np.float64) for name, array in cached.items()}
     names = [name.removesuffix(" mean") for name in arrays if name.endswith(" mean")]
     return {name: FieldStatistics(arrays[f"{name} mean"], arrays[f"{name} std"]) for name in names}
 

@@ -109,8 +109,8 @@ def _contacts(subject: Subject, rows: Rows) -> Floats:
     rate = float(1 / np.median(rows.steps[known])) if known.any() else None
     ends = [0, *(np.flatnonzero(~known) + 1).tolist(), n_frames]
     runs = list(zip(ends[:-1], ends[1:], strict=True))
-    found = tracks.contacts(rate, skeleton.up_axis, runs=runs)
-    return np.stack([found.frames(joint) for joint in tracks.joints], axis=1).astype(np.float64)
+    contacts = tracks.contacts(rate, skeleton.up_axis, runs=runs)
+    return np.stack([contacts.frames(joint) for joint in tracks.joints], axis=1).astype(np.float64)
 
 
 def _up_column(skeleton: Skeleton) -> int:
@@ -300,13 +300,13 @@ def subject_of(
     return replace(subject, read_joints=tuple(sorted(needed)))
 
 
-def signal_shape(clip: Clip, wanted: Field) -> SignalShape:
+def signal_shape(clip: Clip, field: Field) -> SignalShape:
     """The channels of the signal that a field is; raises OptionError."""
     infos = {info.name: info for info in reversed(clip.signals)}
-    if wanted.signal not in infos:
+    if field.signal not in infos:
         known = [*FIELDS, *infos]
-        raise OptionError(f"no field or signal {wanted.name!r} among {among(known, wanted.name)}")
-    info = infos[wanted.signal]
+        raise OptionError(f"no field or signal {field.name!r} among {among(known, field.name)}")
+    info = infos[field.signal]
     if info.channels is None:
         names = clip.skeleton.channel_addresses()
     else:

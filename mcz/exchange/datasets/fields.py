@@ -88,7 +88,7 @@ class Rows(NamedTuple):
     """Channels of frames, (n_frames, n_channels), and the seconds from each frame to the next.
 
     ``signals`` are the values of the signals that fields name, (n_frames, n_channels), or
-    (n_frames, samples, n_channels) where a frame has several samples.
+    (n_frames, samples, n_channels) if a frame has several samples.
     """
 
     values: Floats
@@ -156,8 +156,8 @@ def features_of(
     arrays = {}
     for each in fields:
         low, high = max(0, first - each.reach), max(0, last - each.reach)
-        made = each.make(subject, rows.part(low, len(rows.steps) + 1 - high))
-        part = made[first - low : len(made) - (last - high)]
+        features = each.make(subject, rows.part(low, len(rows.steps) + 1 - high))
+        part = features[first - low : len(features) - (last - high)]
         with np.errstate(over="ignore"):
             arrays[each.name] = np.ascontiguousarray(part, dtype)
         if np.isinf(arrays[each.name]).any() and not np.isinf(part).any():

@@ -9,7 +9,7 @@ the data set (``motion_representation``). Columns, of a frame and the next one:
     4:67       positions of the joints but the root: root at x = z = 0, facing z
     67:193     rotations of the joints but the root, two columns of the matrix (6D)
     193:259    velocities of all joints, by the heading
-    259:263    1 where it stands: left ankle, left foot, right ankle, right foot
+    259:263    1 if it stands: left ankle, left foot, right ankle, right foot
 
 Velocities are metres a frame. The heading is smoothed; of the first frame it is 0.
 """
@@ -32,7 +32,7 @@ _NAMES = """
 JOINTS = tuple(_NAMES.split())
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
 CHAIN_STARTS = (1, 2, 3, 13, 14)  # turned from the root, the collars too
-# Directions of the bones in the rest pose, a joint each: an axis, negative where it is a capital.
+# Directions of the bones in the rest pose, a joint each: an axis, negative if it is a capital.
 BONES = "-xXyYYyYYyzzyxXzYYYYYY"
 LEFT_FOOT, RIGHT_FOOT = [7, 10], [8, 11]
 # Hips and shoulders, each from the second to the first. For the smoothed heading the published
@@ -52,8 +52,8 @@ def humanml3d(
     ``positions`` (n_frames, 22, 3), in metres, y up, at 20 frames a second: of SMPL's joints in
     their order, ``pelvis`` to ``right_wrist``. ``bone_lengths`` (22,), of each joint from its
     parent, makes the body that size first, as HumanML3D does with the body of its clip 000021; the
-    root moves by the ratio of the legs. A foot stands where it moves less than the root of
-    ``threshold`` in metres, from a frame to the next. Where a position is NaN, so is what depends
+    root moves by the ratio of the legs. A foot stands if it moves less than the root of
+    ``threshold`` in metres, from a frame to the next. If a position is NaN, so is what depends
     on it. Raises MotionError for another shape, and OptionError for other lengths.
     """
     places = _check_positions(positions)

@@ -60,21 +60,21 @@ def dataset(
     ``fields``: names, with commas or as a list: channels, positions, velocities, accelerations,
     root, rot6d, quat, rotvec, matrix, heading, foot_speed, contacts, humanml3d and more, or the
     name of any signal; docs/guides/datasets.md has their shapes. ``rate``: all are resampled to it,
-    exactly where every n-th frame will do; ``source_rate`` is that of clips that do not say theirs.
+    exactly if every n-th frame will do; ``source_rate`` is that of clips that do not say theirs.
     ``window`` frames each, every ``stride`` (as many, if None); None: whole clips. ``where``
     chooses clips: an expression as in ``File.find``, or a function of a Clip. ``joints`` and
     ``unit`` as in ``positions``; ``up`` is the up axis of skeletons that do not state it.
     ``normalize``: see ``Dataset.normalized``.
     ``cache``: bytes to keep in memory, or in ``folder``, across runs: "256 MB".
 
-    Where frames are missing, the parts between are clips of their own, so that no window spans a
+    If frames are missing, the parts between are clips of their own, so that no window spans a
     gap, unless ``across_gaps``. Clips too short for a window are listed in ``Dataset.skipped``.
     Raises OptionError if clips do not go together: other joints, rates or units; MotionError and
     FormatError if one cannot be used.
     """
     recipe = _recipe(fields, rate, joints, Units(unit, up), dtype)
     window, stride = _cut(window, stride)
-    given: dict[str, File] = {}
+    open_files: dict[str, File] = {}
     size = to_size(cache)
     settings = Settings(recipe, window, stride, size, None if folder is None else Path(folder))
     assumed = None if source_rate is None else frame_rate_of(source_rate, "source_rate")
@@ -83,8 +83,8 @@ def dataset(
     skipped: list[Member] = []
     with ExitStack() as stack:
         opened: dict[str, File] = {}
-        for file, name in _files(target, given):
-            if name not in given:
+        for file, name in _files(target, open_files):
+            if name not in open_files:
                 stack.enter_context(file)
                 opened[name] = file
             clips = file.clips.values()
@@ -98,12 +98,12 @@ def dataset(
             if len(opened) > MOST_OPEN:
                 opened.pop(name).close()
         if not members:
-            wanted = "" if window is None else f" of at least {window} frames"
-            raise OptionError(f"no clip{wanted} in the given files")
+            length = "" if window is None else f" of at least {window} frames"
+            raise OptionError(f"no clip{length} in the given files")
         stack.pop_all()
-    made = Dataset(settings, members, given, skipped)
-    made.adopt(opened)
-    return made.normalized() if normalize else made
+    result = Dataset(settings, members, open_files, skipped)
+    result.adopt(opened)
+    return result.normalized() if normalize else result
 
 
 def _recipe(
@@ -129,19 +129,21 @@ def _cut(window: int | None, stride: int | None) -> tuple[int | None, int]:
     return window, stride or window or 1
 
 
-def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterator[tuple[File, str]]:
-    """The files, each with what ``mcz.open`` takes for it; those that were open go to ``given``."""
+def _files(
+    target: Target | Iterable[Target], open_files: dict[str, File]
+) -> Iterator[tuple[File, str]]:
+    """The files, each with its argument for ``mcz.open``; adds open ones to ``open_files``."""
     several = isinstance(target, Iterable) and not isinstance(target, (str, os.PathLike, File))
     for one in target if several else [target]:  # type: ignore[union-attr]
         if isinstance(one, File):
-            name = one.name if one.name not in given else f"{one.name} ({len(given) + 1})"
-            given[name] = one
+            name = one.name if one.name not in open_files else f"{one.name} ({len(open_files) + 1})"
+            open_files[name] = one
             yield one, name
             continue
         path = os.fspath(one)  # type: ignore[arg-type]
         paths = [path]
         if Path(path).is_dir():
-            paths = sorted(str(found) for found in Path(path).rglob("*.mcz"))
+            paths = sorted(str(file) for file in Path(path).rglob("*.mcz"))
             if not paths:
                 raise OptionError(
                     "the folder contains no .mcz file; make one with mcz pack", path=path
@@ -210,16 +212,17 @@ class _Agreement:
         if key in self._known:
             return
         self._known.add(key)
-        found = self._facts(clip, member)
+        facts_of_member = self._facts(clip, member)
         if self._first is None:
-            self._first = member, found
+            self._first = member, facts_of_member
             return
         first, facts = self._first
         for what, advice in ADVICE.items():
-            if facts[what] != found[what]:
+            if facts[what] != facts_of_member[what]:
+                values = facts_of_member[what], facts[what]
                 raise OptionError(
-                    f"{member.label} has {_short(found[what], facts[what])}, {first.label} has "
-                    f"{_short(facts[what], found[what])}: {what} differ; {advice}"
+                    f"{member.label} has {_short(*values)}, {first.label} has "
+                    f"{_short(*values[::-1])}: {what} differ; {advice}"
                 )
 
     def _facts(self, clip: Clip, member: Member) -> JsonObject:

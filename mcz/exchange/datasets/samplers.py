@@ -89,19 +89,19 @@ class WindowBatchSampler(EpochSampler[list[int]]):
 
 
 def label_of(member: Member, clip: Clip, by: str, pattern: str | None) -> str:
-    """The subject of a clip; raises OptionError where it has none."""
+    """The subject of a clip; raises OptionError if it has none."""
     if pattern is not None:
         try:
-            found = re.search(pattern, member.clip)
+            match = re.search(pattern, member.clip)
         except re.error as error:
             raise OptionError(f"pattern {pattern!r}: {error}") from None
-        if found is None or not found.groups() or found[1] is None:
+        if match is None or not match.groups() or match[1] is None:
             raise OptionError(
                 f"pattern {pattern!r} captures no group in its name",
                 path=member.target,
                 clip=member.clip,
             )
-        return found[1]
+        return match[1]
     if by == "clip":
         return member.label
     if by not in clip.metadata:

@@ -104,7 +104,7 @@ class Sources:
         self._open: OrderedDict[str, File] = OrderedDict()
         self._subjects: OrderedDict[tuple[object, ...], Subject] = OrderedDict()
         self._lock = Lock()
-        # Where files take turns in being open, none is closed while another thread reads it.
+        # If files take turns in being open, none is closed while another thread reads it.
         self._turns: AbstractContextManager[object] = (
             Lock() if n_targets > MOST_OPEN else nullcontext()
         )
@@ -166,16 +166,16 @@ class Sources:
         """Prepared once for each skeleton."""
         key = recipe.subject_key(clip, member)
         with self._lock:
-            found = self._subjects.get(key)
-            if found is None:
-                found = self._subjects[key] = recipe.subject(clip, member)
+            subject = self._subjects.get(key)
+            if subject is None:
+                subject = self._subjects[key] = recipe.subject(clip, member)
                 if len(self._subjects) > MOST_SUBJECTS:
                     self._subjects.popitem(last=False)
-            return found
+            return subject
 
 
 def timeline_of_member(clip: Clip, member: Member) -> Timeline:
-    """The times of the frames of a member, where they are known."""
+    """The times of the frames of a member, if they are known."""
     timeline = known_timeline(clip.name, clip.timeline_at(member.source_rate))
     return timeline.cut(slice(member.first, member.first + member.n_source))
 

@@ -289,12 +289,12 @@ class Dataset:
         size = self._settings.recipe.dtype.itemsize
         values = sum(int(np.prod(shape)) for shape in self.shapes.values())
         decoded = self._settings.decoded_bytes
-        kept = self._settings.feature_bytes // (size * max(1, values))
-        if self.n_frames <= kept:
+        cached_frames = self._settings.feature_bytes // (size * max(1, values))
+        if self.n_frames <= cached_frames:
             return 2**62
         n_channels = self._first_subject().skeleton.n_channels
         # Segments reach beyond the ends of a run: two thirds of what is decoded is of use.
-        return min(kept, int(decoded // (8 * max(1, n_channels))) * 2 // 3)
+        return min(cached_frames, int(decoded // (8 * max(1, n_channels))) * 2 // 3)
 
     def shuffled(self, seed: int, epoch: int = 0) -> Iterator[dict[str, Reals]]:
         """The windows in the ``order`` of an epoch."""
@@ -305,7 +305,7 @@ class Dataset:
     ) -> Iterator[dict[str, Reals]]:
         """Batches of ``size`` windows, in the ``order`` of an epoch or, seed None, as they come.
 
-        The last one is smaller where they do not come out even, unless ``drop_last``.
+        The last one is smaller if they do not come out even, unless ``drop_last``.
         """
         size = SIZE(size)
         numbers = np.arange(len(self)) if seed is None else self.order(seed, epoch)
@@ -346,7 +346,7 @@ class Dataset:
         near to these as whole subjects allow, each at least one. ``by``: a key of the clips'
         metadata, or "clip", of which each stands for itself; ``pattern``: a regular expression
         whose first group, found in the name of a clip, is its subject instead. The same ``seed``
-        splits the same clips in the same way. Raises OptionError if a clip has none, and where
+        splits the same clips in the same way. Raises OptionError if a clip has none, and if
         there are fewer subjects than parts.
         """
         from mcz.exchange.datasets.samplers import split

@@ -102,11 +102,11 @@ def same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
         notes.append(f"{without[0].name!r}: {NO_LENGTHS}, unlike on the other side: no positions")
         return False
     pairs = zip(point_names(original.skeleton), point_names(decoded.skeleton), strict=False)
-    apart = [pair for pair in pairs if pair[0] != pair[1]]
-    if apart:
-        first = " and ".join(map(repr, apart[0]))
+    unlike = [pair for pair in pairs if pair[0] != pair[1]]
+    if unlike:
+        first = " and ".join(map(repr, unlike[0]))
         notes.append(
-            f"points are compared in order; {len(apart)} of {counts[0]} have other "
+            f"points are compared in order; {len(unlike)} of {counts[0]} have other "
             f"names on the other side, first {first}"
         )
     return True

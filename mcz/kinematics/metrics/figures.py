@@ -122,11 +122,15 @@ def _measure_contacts(
         foot = ours.joints.index(run.joint)
         frames = slice(run.first, run.first + run.n_frames)
         a, b = ours.feet[foot, frames] * to_mm, theirs.feet[foot, frames] * to_mm
-        apart = _lengths((b - b[:1]) - (a - a[:1]))[1:]
+        differences = _lengths((b - b[:1]) - (a - a[:1]))[1:]
         original, decoded = (_lengths(np.diff(places, axis=0)) for places in (a, b))
         known = np.isfinite(original) & np.isfinite(decoded)
         yield _ContactDistances(
-            run, apart, float(decoded[known].sum()), float(original[known].sum()), int(known.sum())
+            run,
+            differences,
+            float(decoded[known].sum()),
+            float(original[known].sum()),
+            int(known.sum()),
         )
 
 

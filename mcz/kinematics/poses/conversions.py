@@ -51,8 +51,8 @@ def check_order(order: str) -> None:
     """Raise OptionError unless ``order`` is an order of Euler angles: three axes, XYZ or xyz."""
     letters = order.lower()
     same_case = order in (letters, order.upper())
-    apart = len(order) == 3 and letters[0] != letters[1] != letters[2]
-    if not (same_case and apart and set(letters) <= set("xyz")):
+    is_alternating = len(order) == 3 and letters[0] != letters[1] != letters[2]
+    if not (same_case and is_alternating and set(letters) <= set("xyz")):
         raise OptionError(
             f"Euler order is {order!r}; it must be three axes, such as ZXY (intrinsic) or zxy "
             "(extrinsic)"
@@ -93,7 +93,7 @@ def _euler_angles(quaternions: Floats, order: str) -> Floats:
     """Euler angles, (n, 3), of quaternions of length 1, (4, n), first to last of ``order``.
 
     E. Bernardes and S. Viollet 2022, "Quaternion to Euler angles conversion: A direct, general and
-    computationally efficient method". The second angle is in [0, pi] where the first axis is also
+    computationally efficient method". The second angle is in [0, pi] if the first axis is also
     the last, else in [-pi/2, pi/2]; the others are in [-pi, pi]. In gimbal lock the third is 0.
     """
     turning = order.isupper()  # about axes that turn along: as about fixed ones, reversed
@@ -268,7 +268,7 @@ def scalar_quaternions(
 ) -> list[Quaternion]:
     """The columns of quaternions: four plain scalars side by side whose norm is 1 in all rows.
 
-    Raises OptionError if these overlap and names do not decide between them, and where columns
+    Raises OptionError if these overlap and names do not decide between them, and if columns
     with the names of a quaternion have another norm.
     """
     names = _plain_names(skeleton, own)
@@ -283,16 +283,16 @@ def scalar_quaternions(
                 f"{_describe_columns(names, at)} are named like a quaternion, but their norm "
                 f"is not 1{HINT}"
             )
-    apart: list[int] = []
+    accepted: list[int] = []
     for at in starts:
         rivals = [other for other in starts if other != at and abs(other - at) < SIZE]
         if not rivals or (at in named and named.isdisjoint(rivals)):
-            apart.append(at)
+            accepted.append(at)
         elif named.isdisjoint([at, *rivals]):
             raise OptionError(
                 f"{_describe_columns(names, at)} may be a quaternion or independent columns{HINT}"
             )
-    return [tuple(range(at, at + SIZE)) for at in apart]
+    return [tuple(range(at, at + SIZE)) for at in accepted]
 
 
 def _plain_names(skeleton: Skeleton | None, own: Sequence[Channel] | None) -> list[str | None]:

@@ -58,15 +58,15 @@ def resample(
     through four frames. A frame that coincides with one of ``motion`` equals it bit for bit. No
     filter is applied: at a lower rate, motion faster than half of it folds back (aliasing). New
     frames lie between old ones by their times: a value between frames of which one is unknown is
-    unknown. Where frames are missing, the result has no frames either, and its frame numbers skip
+    unknown. If frames are missing, the result has no frames either, and its frame numbers skip
     them.
 
     Four plain scalars side by side whose norm is 1 in every frame are a quaternion too, and turn;
-    ``source-note`` of the result lists them. OptionError where these overlap, or where columns with
+    ``source-note`` of the result lists them. OptionError if these overlap, or if columns with
     the names of a quaternion have another norm. ``components``: plain scalars are always splines.
 
     Other signals cannot follow: OptionError unless ``drop_signals``. The result has no source, and
-    the times of the old. Raises OptionError where the times of ``motion`` are unknown, MotionError
+    the times of the old. Raises OptionError if the times of ``motion`` are unknown, MotionError
     for a bad ``rate``.
     """
     new_rate = frame_rate_of(rate, motion.name)
@@ -112,8 +112,8 @@ def resample(
 def times_of(timeline: Timeline, rate: Fraction, signal: Signal) -> tuple[Ints, Times]:
     """The frames at ``rate`` within the runs of ``timeline``, and their places.
 
-    Counted from 0 at its first time, in exact arithmetic where times lie at whole multiples of 1 /
-    rate. Raises OptionError where they would be too many.
+    Counted from 0 at its first time, in exact arithmetic if times lie at whole multiples of 1 /
+    rate. Raises OptionError if they would be too many.
     """
     room = MOST_VALUES // max(1, signal.n_channels)
     parts: list[tuple[Ints, Times]] = []

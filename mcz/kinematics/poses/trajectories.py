@@ -101,11 +101,11 @@ def velocities(
 ) -> Reals:
     """Velocities of the points, (n_frames, n_points, 3), in length units (or ``unit``) per second.
 
-    Central differences by the times of the frames, (p[t+1] - p[t-1]) / 2 x rate where these are
+    Central differences by the times of the frames, (p[t+1] - p[t-1]) / 2 x rate if these are
     uniform; one-sided at the ends of the clip, next to unknown positions and next to breaks in
     time, over which no difference is taken: a frame alone between two breaks has NaN. A part of the
     frames has the same results as the whole. Arguments and errors are those of ``positions``;
-    OptionError also where the times are unknown.
+    OptionError also if the times are unknown.
     """
     window = _read_window(moving, joints, frames, unit, 1)
     return as_type(_cut_window(velocities_of(window.places, window.steps), window), dtype)
@@ -121,7 +121,7 @@ def accelerations(
 ) -> Reals:
     """Accelerations of the points, in length units (or ``unit``) per second squared.
 
-    (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or next to a break in
+    (p[t+1] - 2 p[t] + p[t-1]) x rate^2 if times are uniform; at an end or next to a break in
     time the value of the neighbor frame, NaN in a run of fewer than three. Otherwise as
     ``velocities``.
     """

@@ -196,12 +196,12 @@ CMU_BVH_DAZ = {
 
 def _both_sides(rows: dict[str, str]) -> dict[str, tuple[str, ...]]:
     """The rows, with a row for each side where they have placeholders of sides."""
-    made: dict[str, tuple[str, ...]] = {}
+    maps: dict[str, tuple[str, ...]] = {}
     for side in ("left", "right"):
         words = {"side": side, "Side": side.title(), "s": side[0], "S": side[0].upper()}
         for part, names in rows.items():
-            made[part.format(**words)] = tuple(names.format(**words).split("|"))
-    return made
+            maps[part.format(**words)] = tuple(names.format(**words).split("|"))
+    return maps
 
 
 def _themselves(*parts: str) -> dict[str, tuple[str, ...]]:

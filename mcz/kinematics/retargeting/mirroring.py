@@ -39,7 +39,7 @@ def mirror(motion: Motion, axis: str = "x", pairs: Mapping[str, str] | None = No
     its bones and its channels. Names, order and parents are kept. Numbers stay on their grids.
 
     Counterparts are found by name, such as "LeftArm" and "RightArm", "lfemur" and "rfemur",
-    "Hand_L" and "Hand_R"; a joint without a side is its own. ``pairs`` maps names to names where
+    "Hand_L" and "Hand_R"; a joint without a side is its own. ``pairs`` maps names to names if
     they do not show it. The result has no source.
 
     Raises OptionError for a side without counterpart, for a pair whose parents are not a pair, and

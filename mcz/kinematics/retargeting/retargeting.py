@@ -88,8 +88,8 @@ def retarget(
         raise OptionError(f"retarget: scale is {scale}; it must be above 0")
     values = np.asarray(motion.values, np.float64)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        made = _Retargeted(source, skeleton, pairs, values, scale, match_rest).values()
-    return replace_motion(motion, replace(skeleton, base=None), computed_signal(motion, made))
+        retargeted = _Retargeted(source, skeleton, pairs, values, scale, match_rest).values()
+    return replace_motion(motion, replace(skeleton, base=None), computed_signal(motion, retargeted))
 
 
 def _check(source: Skeleton, target: Skeleton) -> None:
@@ -137,14 +137,14 @@ class _Retargeted:
                 multiply_matrices(inverse(self.rest[above]), turn), self.rest[joint]
             )
             target = multiply_matrices(missed[above], turn)
-            made = set_local_turns(self.ours, joint, target, self.columns)
-            missed[joint] = _known(multiply_matrices(inverse(made), target))
+            turned = set_local_turns(self.ours, joint, target, self.columns)
+            missed[joint] = _known(multiply_matrices(inverse(turned), target))
         self.travel.set(self.columns, self.rest)
         return np.ascontiguousarray(self.columns.T)
 
 
 def _known(turn: Floats) -> Floats:
-    """The same, the identity where unknown: joints below are known independently."""
+    """The same, the identity if unknown: joints below are known independently."""
     known = finite_frames(turn)
     return turn if known.all() else np.where(known, turn, IDENTITY)
 

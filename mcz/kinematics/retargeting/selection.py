@@ -45,7 +45,7 @@ Named = TypeVar("Named", Motion, Skeleton)
 def rename(named: Named, mapping: Mapping[str, str]) -> Named:
     """Rename the joints of a motion or skeleton by ``mapping``, from old name to new.
 
-    Other joints keep their names; where a name repeats, ``name#1`` is the second joint of that
+    Other joints keep their names; if a name repeats, ``name#1`` is the second joint of that
     name, as in ``Skeleton.joint_names``. Numbers stay unchanged. The result has no source: a file's
     text has the old names. Other signals keep the names of their channels.
 
@@ -255,8 +255,8 @@ def bake_joints(
         number = kept.index(joint)
         joints[number] = _baked_joint(skeleton, joints[number], turn)
         columns[number] = np.concatenate([places[joint], _angles(selected, joints[number], turn)])
-    made = replace(selected, joints=tuple(joints))
-    return made, _join_signals(motion, selected, made, signal, columns)
+    baked = replace(selected, joints=tuple(joints))
+    return baked, _join_signals(motion, selected, baked, signal, columns)
 
 
 def _check(skeleton: Skeleton, parent: int) -> None:

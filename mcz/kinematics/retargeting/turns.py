@@ -24,7 +24,7 @@ from mcz.model.types import Bools, Floats
 
 
 def local_turns(chain: Chain, joint: int, columns: Floats) -> Floats:
-    """L of a joint, (3, 3, F), or (3, 3, 1) where it is constant, from values (n_channels, F)."""
+    """L of a joint, (3, 3, F), or (3, 3, 1) if it is constant, from values (n_channels, F)."""
     rest_turn = chain.turned[joint]
     parent_axes = IDENTITY if rest_turn is None else rest_turn[:, :, None]
     origin = np.zeros((3, 1))
@@ -37,7 +37,7 @@ def local_turns(chain: Chain, joint: int, columns: Floats) -> Floats:
 def set_local_turns(chain: Chain, joint: int, turn: Floats, columns: Floats) -> Floats:
     """Write the values of a joint whose L is nearest to ``turn`` into ``columns`` (n_channels, F).
 
-    Where ``turn`` is not known, the values are NaN. Returns their L, (3, 3, F or 1).
+    If ``turn`` is not known, the values are NaN. Returns their L, (3, 3, F or 1).
     """
     link, rest_turn = chain.links[joint], chain.turned[joint]
     if not link.turns:

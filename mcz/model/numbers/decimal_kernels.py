@@ -70,7 +70,7 @@ def match(
 
     ``rule``: significant digits or 0, decimals, trimmed, low, high, flags, limit. With digits:
     ``%g``, with an exponent below ``low`` and from ``high`` on. Without: so many decimals, or up to
-    so many where trimmed. Magnitudes above ``limit`` are not printed.
+    so many if trimmed. Magnitudes above ``limit`` are not printed.
     """
     digits, decimals, trim, low, high, flags, limit = rule
     refused = LONG | SPECIAL | BAD | EXTRA_ZERO | (0 if digits else EXPONENT)
@@ -141,7 +141,7 @@ def _scaled(mantissa: int, shift: int, limit: int) -> int:
         if mantissa > limit:
             break
         mantissa *= 10
-    for _ in range(-shift):  # a ".0" where the grid has no decimals
+    for _ in range(-shift):  # a ".0" if the grid has no decimals
         mantissa //= 10
     return min(mantissa, limit + 1)
 

@@ -91,7 +91,7 @@ class Grid:
 
     @property
     def lowest(self) -> int:
-        """The least ordinal: one below ``-limit`` where zero has a sign."""
+        """The least ordinal: one below ``-limit`` if zero has a sign."""
         return -1 - self.limit if self.signed_magnitude else -self.limit
 
     def magnitudes(self, ordinals: Values) -> Ints:

@@ -47,7 +47,7 @@ class GridFlag(IntFlag):
 
     POINT_ZERO = 1  # an integral number without exponent ends in ".0"
     POINT = 2  # an integral number without exponent ends in "."
-    NO_ZERO = 4  # no zero before the point where digits follow it: ".5"
+    NO_ZERO = 4  # no zero before the point if digits follow it: ".5"
     PLUS = 8  # numbers without a minus sign have a plus sign
     EXPONENT3 = 16  # at least 3 digits in an exponent (else 2)
     EXPONENT1 = 32  # at least 1 digit in an exponent

@@ -192,8 +192,8 @@ def _is_reversible(digits: int, style: int) -> bool:
     """Return True if the text determines the number among all of its base."""
     if digits > BASE_GENERAL:
         return True
-    shown = style - EXPONENT + 1 if style >= EXPONENT else style - SIGNIFICANT
-    return shown >= (DECIMAL_TRIP if digits < BASE_32 else ROUND_TRIP)
+    n_digits = style - EXPONENT + 1 if style >= EXPONENT else style - SIGNIFICANT
+    return n_digits >= (DECIMAL_TRIP if digits < BASE_32 else ROUND_TRIP)
 
 
 def printer(style: int) -> Callable[[float], str]:

@@ -44,14 +44,14 @@ from mcz.model.numbers.value_kernels import (
 )
 
 OUTSIDE = -1  # in place of a count
-NO_FRACTION = -1  # digits after a point where there is none
+NO_FRACTION = -1  # digits after a point if there is none
 POINT_DIGIT = 46 ^ 48
 
 
 @kernel
 def scan(text: Bytes, start: Ints, stop: Ints, fields: Ints2) -> int:
     """Fill ``fields`` (n, 3) from tokens ``text[start[i]:stop[i]]``; returns the number of bad
-    ones, ``OUTSIDE`` where one is outside of the text.
+    ones, ``OUTSIDE`` if one is outside of the text.
     """
     n_bad = 0
     for token in range(len(start)):
@@ -157,7 +157,7 @@ def _eight_characters(text: Bytes, end: int, size: int) -> tuple[int, int]:
     """The ``size`` <= 8 digits before ``end``, a byte each, the last in the highest.
 
     Returned with the number of digits after the point: ``NO_FRACTION`` without one, ``BAD`` or more
-    where there is another character or a second point.
+    if there is another character or a second point.
     """
     last = int(text[end - 1]) ^ 48
     digits = (eight_bytes(text, end - 8) ^ 0x3030303030303030) & -(1 << 64 - 8 * size)
@@ -212,7 +212,7 @@ MOST_DIGITS = 31
 SIGNED, UNSIGNED = 0, 1  # a plus sign, and no sign at all
 BARE_INTEGER, NO_ZERO = 2, 3  # "0.5", ".5"
 POINT_ONLY, NO_POINT, POINT_ZERO = 4, 5, 6  # integral numbers: "5.", "5", "5.0"
-THREE, TWO, ONE, TWO_OF_ONE = 7, 8, 9, 10  # digits of an exponent, the last where one would do
+THREE, TWO, ONE, TWO_OF_ONE = 7, 8, 9, 10  # digits of an exponent, the last if one would do
 CAPITAL, SMALL = 11, 12  # "E", "e"
 N_STYLES = 13
 
@@ -328,7 +328,7 @@ def put_value(value: float, rule: Ints, tens: Floats, powers: Floats, out: Bytes
 
 
 def small_decimal(value: float, power: int, digits: int, tens: Floats) -> int:
-    """``decimal`` of a value whose first digit is at ``power``, where two products reach it.
+    """``decimal`` of a value whose first digit is at ``power``, if two products reach it.
 
     Rounded twice, a number of few digits moves by less than ``CLOSE``. 0: it is nearly a tie.
     """

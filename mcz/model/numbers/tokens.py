@@ -207,7 +207,7 @@ def nearest(mantissa: Ints, power: Ints) -> Floats:
 def scale(mantissa: Ints, power: Ints) -> tuple[Floats, Bools]:
     """``mantissa * 10^power`` in binary64, and a mask of results that may not be the nearest.
 
-    One product or quotient of two exact factors is correctly rounded: they are exact where the
+    One product or quotient of two exact factors is correctly rounded: they are exact if the
     mantissa is at most 2^53 and the power at most 22 either way.
     """
     out = mantissa.astype(np.float64)

@@ -27,7 +27,7 @@ def scaled(mantissa: int, power: int, tens: Floats) -> float:
 def values_of_general(
     ordinals: Ints2, values: Floats2, c: int, start: int, stop: int, rule: Ints, tens: Floats
 ) -> bool:
-    """Numbers of so many significant digits; False where one has too large a power of ten."""
+    """Numbers of so many significant digits; False if one has too large a power of ten."""
     low = int(tens[rule[DIGITS] - 1])
     per_class, limit = 9 * low, rule[LIMIT]
     first = NONE  # the least magnitude of the class of the last number
@@ -128,7 +128,7 @@ def ordinals_of_general(
     ordinals: Ints2,
     exact: Bytes2,
 ) -> bool:
-    """Numbers of so many significant digits; False where one needs a closer look."""
+    """Numbers of so many significant digits; False if one needs a closer look."""
     low, high = tens[digits - 1], tens[digits]
     power = shift = since = 0  # since: excess of magnitudes over mantissas
     ten = 1.0
@@ -168,7 +168,7 @@ def ordinals_of_fixed(
     ordinals: Ints2,
     exact: Bytes2,
 ) -> bool:
-    """Numbers of so many decimals; False where one is beyond the grid or NaN."""
+    """Numbers of so many decimals; False if one is beyond the grid or NaN."""
     ten = tens[rule[POWER]]
     for t in range(start, stop):
         value = values[t, c]
@@ -194,7 +194,7 @@ def fill_ordinals(
     exact: Bytes2,
     left: Ints,
 ) -> None:
-    """Fill ``ordinals`` (rows, channels), and ``exact`` with 1 where they restore the values.
+    """Fill ``ordinals`` (rows, channels), and ``exact`` with 1 if they restore the values.
 
     ``left``: channels not filled. Their grid is not decimal, or a value has no exact product or
     quotient.

@@ -67,7 +67,7 @@ def print_values(
     """The texts of the numbers nearest to values, (rows, channels), on their decimal grids.
 
     ``start``, counted from ``base``, and ``size`` locate each, except on other grids, for values
-    beyond their grid, and where no product or quotient of tens is exact.
+    beyond their grid, and if no product or quotient of tens is exact.
     """
     of_channels = print_rules(grids)
     out = np.empty(values.size * WIDEST + SPARE, np.uint8)

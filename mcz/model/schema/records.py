@@ -197,7 +197,7 @@ def _read(
     before: str | None = None,
     compiled: bool,
 ) -> T:
-    """Read with the compiled schema, if asked to, and with the plain one where that fails."""
+    """Read with the compiled schema, if asked to, and with the plain one if that fails."""
     if compiled:
         try:
             return read(record.compiled_type(before))
@@ -208,7 +208,7 @@ def _read(
 
 
 def build(record: Record, where: str) -> bytes:
-    """The bytes of ``record``; raises FormatError where its schema does not admit a value."""
+    """The bytes of ``record``; raises FormatError if its schema does not admit a value."""
     with _our_errors(where):
         return bytes(record.construct_type().build(record))
 

@@ -242,7 +242,7 @@ class Optional(construct.Adapter):
 
 
 def only_if(condition: object, item: Kind) -> Construct:
-    """An item that is present only where the condition holds; otherwise None."""
+    """An item that is present only if the condition holds; otherwise None."""
     return construct.If(condition, as_construct(item))
 
 

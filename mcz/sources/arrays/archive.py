@@ -1,6 +1,6 @@
 """The structure of a ZIP archive: its members, and the fields that follow from them.
 
-Deflated members are inflated, up to a limit. A ZIP states most things twice: where the two disagree
+Deflated members are inflated, up to a limit. A ZIP states most things twice: if the two disagree
 about the place of a member, it is refused.
 """
 
@@ -41,7 +41,7 @@ class Member:
     bytes; ``entry`` is that of its entry in the central directory.
 
     ``contents`` are the offsets in ``Archive.data`` of its ``size`` bytes as they were before they
-    were packed; None where they are not known, for the reason ``fault``.
+    were packed; None if they are not known, for the reason ``fault``.
     """
 
     name: str
@@ -109,14 +109,14 @@ def read_archive(data: bytes) -> Archive:
         for f in fields
         if f.kind == Kind.CRC
     }
-    true, wrong, taken = [], set(), 0
+    true, wrong, written_to = [], set(), 0
     for field in fields:
         width = SIZES[field.kind]
         is_sum = field.kind == Kind.CRC
         number = sums[field.start, field.stop] if is_sum else field.stop - field.start
-        if field.at >= taken and _number(data, field.at, width) == number:
+        if field.at >= written_to and _number(data, field.at, width) == number:
             true.append(field)
-            taken = field.at + width
+            written_to = field.at + width
         elif is_sum and field.at >= start:
             span = field.start, field.stop
             wrong |= {member.name for member in members if member.contents == span}
@@ -178,8 +178,8 @@ def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
     if at + 46 > end or data[at : at + 4] != CENTRAL:
         raise SourceError("the directory has an invalid entry", offset=at)
     sizes = [_number(data, at + k, 2) for k in (28, 30, 32)]
-    behind = at + 46 + sum(sizes)
-    if behind > end:
+    next_entry = at + 46 + sum(sizes)
+    if next_entry > end:
         raise SourceError("an entry of the directory extends past its end", offset=at)
     raw = data[at + 46 : at + 46 + sizes[0]]
     name = raw.decode("utf-8" if _number(data, at + 8, 2) & 0x800 else "cp437", "replace")
@@ -198,7 +198,7 @@ def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
             offset=at,
         )
     _check_local(data, member, raw)
-    return member, behind
+    return member, next_entry
 
 
 def _check_names(members: list[Member]) -> None:
@@ -212,7 +212,7 @@ def _check_names(members: list[Member]) -> None:
 
 
 def _check_local(data: bytes, member: Member, raw: bytes) -> None:
-    """Raise SourceError where the local header of a member is about something else."""
+    """Raise SourceError if the local header of a member is about something else."""
     at = member.at
     if data[at + 30 : at + 30 + _number(data, at + 26, 2)] != raw:
         raise SourceError(f"member {member.name!r} has another name in its local header", offset=at)

@@ -81,16 +81,16 @@ def join_clips(arrays: Sequence[Array], clips: Mapping[str, Mapping[str, int]]) 
         if any(key in keys and _has_frames(array) for key, array in each.items())
     }
     rows = {key: [each.get(key) for each in own.values()] for key in next(iter(own.values()), {})}
-    alike = {key: found for key, found in rows.items() if _are_alike(found)}
-    if all(each.kept or not each.n_rows for found in alike.values() for each in found):
+    shared = {key: arrays for key, arrays in rows.items() if _are_alike(arrays)}
+    if all(each.kept or not each.n_rows for arrays in shared.values() for each in arrays):
         one, two = [*clips][:2]
         raise SourceError(NO_CLIPS.format(n=len(clips), one=one[:80], two=two[:80]))
-    counts = [frames_of([each[key] for key in alike]) for each in own.values()]
+    counts = [frames_of([each[key] for key in shared]) for each in own.values()]
     starts = np.cumsum([1, *(count + 1 for count in counts)]).tolist()
     joined = {
-        key: _joined(found)
-        for key, found in alike.items()
-        if found[0].kept or _have_even_rows(found, counts)
+        key: _joined(arrays)
+        for key, arrays in shared.items()
+        if arrays[0].kept or _have_even_rows(arrays, counts)
     }
     return Library(
         tuple(own),
@@ -264,12 +264,12 @@ def _signals(meaning: Meaning) -> list[Signal]:
 
 
 def _pieces(arrays: Sequence[Array], archive: Archive, placed: Mapping[int, Placed]) -> list[Piece]:
-    kept = [
+    unread = [
         (array.head.start, array.stop)
         for k, array in enumerate(arrays)
         if k not in placed and array.stop > array.head.start
     ]
-    return pieces_of(archive, [*placed.values()], kept)
+    return pieces_of(archive, [*placed.values()], unread)
 
 
 def _metadata(
@@ -278,9 +278,9 @@ def _metadata(
     """Metadata of the file: its words, and notes on oddities."""
     notes = [f"{array.name} is {array.kept}" for array in arrays if array.is_loud]
     notes += [f"the CRC-32 of {name} is not that of its bytes" for name in archive.wrong]
-    kept = [piece for piece in pieces if piece.kind == Kind.DEFLATE and is_kept(piece.text)]
-    if kept:
-        size = sum(len(piece.text) for piece in kept)
+    verbatim = [piece for piece in pieces if piece.kind == Kind.DEFLATE and is_kept(piece.text)]
+    if verbatim:
+        size = sum(len(piece.text) for piece in verbatim)
         notes.append(f"{size} bytes of deflate, not zlib's, are kept as they are")
     notes += meaning.notes
     return meaning.metadata | ({"source-note": "; ".join(notes)} if notes else {})

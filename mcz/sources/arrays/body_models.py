@@ -69,7 +69,7 @@ def offsets_of_model(
 
     ``path`` is a model file of SMPL, SMPL-H or SMPL-X: an NPZ with ``kintree_table`` and either
     ``J``, where joints are, or ``J_regressor`` (dense) and ``v_template``. ``betas`` shape the
-    body, which needs the latter and ``shapedirs``. A model of more joints will do where its first
+    body, which needs the latter and ``shapedirs``. A model of more joints will do if its first
     ``n_joints`` are those of the body tree of as many.
 
     Raises AccessError for a file that cannot be read, SourceError for one that is no such model
@@ -160,11 +160,11 @@ def _check_tree(file: Path, parents: list[int], n_joints: int) -> None:
     if not has_tree(n_joints):
         return
     body = tree(n_joints)
-    for joint, (found, due) in enumerate(zip(parents, body.parents, strict=False)):
-        if found != due:
+    for joint, (parent, body_parent) in enumerate(zip(parents, body.parents, strict=False)):
+        if parent != body_parent:
             raise OptionError(
-                f"joint {joint} is a child of joint {found}, but {body.names[joint]!r} of "
-                f"{body.title} is a child of {due}: the model has other joints",
+                f"joint {joint} is a child of joint {parent}, but {body.names[joint]!r} of "
+                f"{body.title} is a child of {body_parent}: the model has other joints",
                 path=file,
             )
 

@@ -190,7 +190,7 @@ SAMPLE = 64  # rows that are looked at before all of a column are
 class Columns:
     """Columns of one array, (rows, columns), binary64 or int64, and the grid of each.
 
-    ``ordinals`` are there where values do not say them: of NaNs with other bits than usual.
+    ``ordinals`` are there if values do not say them: of NaNs with other bits than usual.
     """
 
     values: Values
@@ -223,8 +223,8 @@ def unfit(words: Items) -> str:
         if size < 8 or not words.size:
             return ""
         most = 2**53
-        beyond = int(words.max()) > most or int(words.min()) < -most
-        return "an integer beyond 2^53" if beyond else ""
+        is_too_large = int(words.max()) > most or int(words.min()) < -most
+        return "an integer beyond 2^53" if is_too_large else ""
     if size == 2:
         bits = _bits(words)
         if (np.isnan(words) & (bits != NANS[2])).any():
@@ -257,7 +257,7 @@ def _bits(words: Items) -> Items:
 
 
 def _grids_of(values: NDArray[np.float64]) -> tuple[Grid, ...]:
-    """The grid of each column of binary64: decimals where all are short, else binary."""
+    """The grid of each column of binary64: decimals if all are short, else binary."""
     n_rows, n_columns = values.shape
     sample = values[np.linspace(0, n_rows - 1, min(SAMPLE, n_rows)).astype(np.int64)]
     places = np.array([_decimals(sample[:, c]) for c in range(n_columns)], np.int64)
@@ -332,10 +332,10 @@ MAX_TEXT = 2**16  # bytes of an array of text that are looked at
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """An array; ``kept`` says why it stays its bytes, "" where its numbers are read.
+    """An array; ``kept`` says why it stays its bytes, "" if its numbers are read.
 
     ``stop`` is where its bytes end, 0 of one whose bytes are not looked into. ``words`` are its
-    numbers, (rows, columns), where it has some; ``text`` is that of one without. ``is_loud``: that
+    numbers, (rows, columns), if it has some; ``text`` is that of one without. ``is_loud``: that
     it is kept is worth a note.
     """
 

@@ -1,7 +1,7 @@
 """The deflate stream of a member, kept as the choices that its contents do not determine.
 
 A stream restored bit for bit needs its blocks, the codes of each, and the matches that zlib's
-search would not have chosen: none where zlib wrote it. SPEC.md, "Deflated contents", is normative.
+search would not have chosen: none if zlib wrote it. SPEC.md, "Deflated contents", is normative.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ class Deflated(Record):
 def describe_stream(stream: bytes, contents: bytes) -> bytes:
     """The part of a detail from which ``restore_stream`` makes ``stream`` of its ``contents``."""
     crc = zlib.crc32(contents)
-    kept = Deflated(crc=crc, level=NO_SEARCH, stream=stream, blocks=[], corrections=[])
-    parts = [build(kept, "deflated member")]
+    verbatim = Deflated(crc=crc, level=NO_SEARCH, stream=stream, blocks=[], corrections=[])
+    parts = [build(verbatim, "deflated member")]
     most = min(MOST_ITEMS, len(stream) // 8)
     for level in ATTEMPTS:
         split = _split(stream, contents, level, most)
@@ -114,7 +114,7 @@ def is_kept(part: bytes) -> bool:
 
 
 def restore_stream(part: bytes, contents: bytes) -> bytes:
-    """The deflate stream of ``contents``, of stored blocks where they are not as they were.
+    """The deflate stream of ``contents``, of stored blocks if they are not as they were.
 
     Raises FormatError if ``part`` does not make one.
     """

@@ -113,7 +113,7 @@ def read_lengths(data: Bytes, at: int, end: int, codes: Codes) -> int:
 
 
 def _sort_symbols(lengths: Ints, start: int, n: int, which: int, codes: Codes) -> bool:
-    """Sort the ``n`` symbols from ``start`` on by their codes; False where they are no codes."""
+    """Sort the ``n`` symbols from ``start`` on by their codes; False if they are no codes."""
     counts = codes.counts
     for length in range(MOST_BITS + 1):
         counts[which, length] = 0
@@ -135,7 +135,7 @@ def _sort_symbols(lengths: Ints, start: int, n: int, which: int, codes: Codes) -
 
 
 def read_symbol(data: Bytes, at: int, end: int, which: int, codes: Codes) -> tuple[int, int]:
-    """A symbol at bit ``at`` and the bit after it; -1 where no code is."""
+    """A symbol at bit ``at`` and the bit after it; -1 if no code is."""
     word = read_bits(data, at, MOST_BITS)
     code = 0
     first = 0
@@ -178,7 +178,7 @@ def _is_whole(codes: Codes, which: int) -> bool:
 
 
 def sort_codes(codes: Codes) -> bool:
-    """Sort the symbols of both codes of a block; False where they are not whole."""
+    """Sort the symbols of both codes of a block; False if they are not whole."""
     if not _sort_symbols(codes.lengths, 0, N_LITERALS, 0, codes):
         return False
     if not _sort_symbols(codes.lengths, N_LITERALS, N_DISTANCES, 1, codes):
@@ -231,7 +231,7 @@ def _distance_symbol(distance: int) -> int:
 
 
 def put_token(out: Bytes, at: int, literal: int, length: int, distance: int, codes: Codes) -> int:
-    """Write a token at bit ``at``; return the bit after it, -1 where a symbol has no code."""
+    """Write a token at bit ``at``; return the bit after it, -1 if a symbol has no code."""
     if length == 1:
         if codes.lengths[literal] == 0:
             return -1

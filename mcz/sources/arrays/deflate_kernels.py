@@ -172,7 +172,7 @@ def split_stream(
 
     ``stream`` has SPARE bytes beyond its end. ``blocks`` (most, 4) become kind, tokens or bytes,
     and the bits where the codes begin and end; ``corrections`` (most, 3) the tokens since the last
-    one, length and distance. Returns the number of each; -1 blocks where they or the corrections
+    one, length and distance. Returns the number of each; -1 blocks if they or the corrections
     are too many, or the stream does not inflate to the content.
     """
     content = search.content

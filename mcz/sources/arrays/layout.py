@@ -210,7 +210,7 @@ def n_file_pieces(pieces: Sequence[Piece]) -> int:
 
 
 def check_spans(pieces: Sequence[Piece]) -> None:
-    """Raise FormatError where pieces refer to others that do not exist, or to themselves."""
+    """Raise FormatError if pieces refer to others that do not exist, or to themselves."""
     n_file = n_file_pieces(pieces)
     for index, piece in enumerate(pieces[n_file:], n_file):
         if piece.kind in OF_PIECES:  # ARRAY-18
@@ -244,7 +244,7 @@ LOCAL, HEADER = b"PK\3\4", 30  # how a member of a ZIP begins; bytes before its 
 
 
 def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
-    """The arrays of a file in order: ``name type order columns signal``, ``name`` alone where kept.
+    """The arrays of a file in order: ``name type order columns signal``, ``name`` alone if kept.
 
     ``columns`` are the numbers of a row, ``order`` is "C" or "F"; ``signals`` are the names of the
     clip's. The name is "" in an NPY file. Raises FormatError on bad bytes.

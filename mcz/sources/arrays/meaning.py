@@ -120,9 +120,9 @@ def frames_of(arrays: Sequence[Array]) -> int:
 
 def _reasons(arrays: Sequence[Array]) -> list[str]:
     """Reasons why the first arrays are no motion."""
-    shown = arrays[:4]
-    reasons = [f"{a.name!r} is {a.kept or f'of shape {a.head.shape}'}" for a in shown]
-    return [*reasons, "..."] if len(arrays) > len(shown) else reasons
+    listed = arrays[:4]
+    reasons = [f"{a.name!r} is {a.kept or f'of shape {a.head.shape}'}" for a in listed]
+    return [*reasons, "..."] if len(arrays) > len(listed) else reasons
 
 
 def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> None:
@@ -317,7 +317,7 @@ def body_of(arrays: Sequence[Array]) -> Body | None:
 
 
 def _pose_parts(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:
-    """The arrays of parts that are the joints of a model in its order, [] where there are none."""
+    """The arrays of parts that are the joints of a model in its order, [] if there are none."""
     root, body = (next((named[n] for n in names if n in named), None) for names in (ROOT, BODY))
     if root is None or body is None or arrays[root].numbers.shape[1] != 3:
         return []

@@ -220,28 +220,28 @@ class Machine:
             self.refuse("something other than a function is called")
         match function.name, arguments:
             case "_reconstruct", (Name("ndarray"), *_):
-                made: object = PickledArray()
+                result: object = PickledArray()
             case "scalar", (DType() as dtype, Raw() as content):
-                made = PickledArray((), dtype, False, content)
+                result = PickledArray((), dtype, False, content)
             case "scalar", (DType() as dtype, _):
-                made = PickledArray((), dtype, fault=AS_TEXT)
+                result = PickledArray((), dtype, fault=AS_TEXT)
             case "_frombuffer", (content, DType() as dtype, tuple() as shape, order, *_):
-                made = PickledArray(shape, dtype, order == "F", None, UNPLAIN)
+                result = PickledArray(shape, dtype, order == "F", None, UNPLAIN)
                 if isinstance(content, Raw) and order in ("C", "F"):
-                    made.content = content
+                    result.content = content
             case "dtype", (code, *_) if self.text_of(code) is not None:
-                made = DType(str(self.text_of(code)))
+                result = DType(str(self.text_of(code)))
             case "OrderedDict", ():
-                made = Dict()
+                result = Dict()
             case "_rebuild_tensor_v2", (Storage() as storage, offset, tuple(), tuple(), *_):
-                made = _tensor(storage, integer_of(offset), *arguments[2:4])
+                result = _tensor(storage, integer_of(offset), *arguments[2:4])
                 if storage.content is not None:
-                    self.tensors.setdefault(storage.content, []).append(made)
+                    self.tensors.setdefault(storage.content, []).append(result)
             case "encode", (str(), *_):
-                made = None  # bytes, written as text
+                result = None  # bytes, written as text
             case _:
                 self.refuse(f"{function.name} is called with arguments that arrays do not have")
-        self.stack.append(made)
+        self.stack.append(result)
 
     def make_object(self) -> None:
         """NEWOBJ: only the wrapper of joblib."""

@@ -51,7 +51,7 @@ class DType:
 class PickledArray:
     """An array: ``content`` is Raw, the list of its objects, or None with a ``fault``.
 
-    ``items`` is how many numbers a tensor has, where the pickle states that.
+    ``items`` is how many numbers a tensor has, if the pickle states that.
     """
 
     shape: tuple[object, ...] = ()
@@ -106,7 +106,7 @@ def _plain_int(data: bytes, start: int, stop: int) -> object:
 
 
 def _old_text(data: bytes, start: int, stop: int) -> str | None:
-    """A printed string of Python 2, None where it has escapes."""
+    """A printed string of Python 2, None if it has escapes."""
     line = data[start:stop].strip()
     is_quoted = len(line) > 1 and line[:1] == line[-1:] and line[:1] in (b"'", b'"')
     if not is_quoted:

@@ -343,8 +343,8 @@ def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
         if piece.kind == Kind.DATA:
             listed.append(list_pieces(names.get(at, ""), [piece], signals))
     placed = {array["name"] for array in listed}
-    kept = [name for name in names.values() if name not in placed]
-    return listed + [list_pieces(name, [], signals) for name in kept]
+    unplaced = [name for name in names.values() if name not in placed]
+    return listed + [list_pieces(name, [], signals) for name in unplaced]
 
 
 def _empty(piece: Piece, starts: Sequence[int], size: int) -> bytes:

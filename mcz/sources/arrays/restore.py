@@ -251,14 +251,14 @@ class Placed:
 
 
 def pieces_of(
-    archive: Archive, placed: Sequence[Placed], kept: Sequence[tuple[int, int]]
+    archive: Archive, placed: Sequence[Placed], unread: Sequence[tuple[int, int]]
 ) -> list[Piece]:
-    """The pieces of a file; ``kept`` are the spans of numbers that are in no signal."""
+    """The pieces of a file; ``unread`` are the spans of numbers that are in no signal."""
     data = archive.data
     spans = [_of_stream(data, member) for member in archive.members if _is_restored(member)]
     for array in placed:
         spans += _of_array(data, array)
-    for start, stop in kept:
+    for start, stop in unread:
         if stop - start <= MAX_OWN:
             spans.append((start, stop, Piece(Kind.OWN, data[start:stop])))
     for field in archive.fields:
@@ -291,7 +291,7 @@ def _of_stream(data: bytes, member: Member) -> tuple[int, int, Piece]:
 def _cut_pieces(
     data: bytes, spans: Sequence[tuple[int, int, Piece]], cuts: Sequence[int]
 ) -> tuple[list[int], list[Piece]]:
-    """The pieces of all spans with the text between, cut where others point; their offsets.
+    """The pieces of all spans with the text between, cut if others point; their offsets.
 
     A PART stands where the frames become others.
     """

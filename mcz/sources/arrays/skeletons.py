@@ -47,7 +47,7 @@ ALIKE = 0.9  # of the joints of a robot that are named like bodies
 
 
 def names_of(arrays: Sequence[Array], keys: Sequence[str]) -> tuple[str, ...]:
-    """The texts of the first array that has one of the names ``keys``, () where there is none."""
+    """The texts of the first array that has one of the names ``keys``, () if there is none."""
     for array in arrays:
         if array.name in keys and array.words is None and len(array.head.shape) == 1:
             code = array.head.code

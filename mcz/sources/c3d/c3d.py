@@ -23,6 +23,7 @@ from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT, Kind, Layout, ordered
 from mcz.sources.c3d.parameters import (
     FLOAT,
     INTEGER,
+    OUTPUTS,
     Parameters,
     Split,
     decode_texts,
@@ -32,7 +33,6 @@ from mcz.sources.c3d.parameters import (
     output_channels,
     parse_parameters,
 )
-from mcz.sources.c3d.parameters import NAME as OUTPUTS
 from mcz.sources.c3d.plain import plain
 from mcz.sources.c3d.recording import is_unsigned, recording_of
 from mcz.sources.c3d.restore import restore
@@ -55,7 +55,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
     """The motion in a C3D file; ``name`` becomes its name.
 
     Raises SourceError, with the offset at fault. Signals: the points, their residuals, outputs,
-    analog, rotations; all but the first only where the file has some.
+    analog, rotations; all but the first only if the file has some.
     """
     order, start = find_parameters(data)
     parameters = parse_parameters(data, order, start)
@@ -208,7 +208,7 @@ def _signal(
 
 
 def _mask_points(points: Signal, residuals: Values) -> Signal:
-    """The points with their mask: valid where the residual is not negative and nothing is NaN."""
+    """The points with their mask: valid if the residual is not negative and nothing is NaN."""
     valid = residuals >= 0
     if points.values.dtype == np.float64:
         nan = np.isnan(points.values)
@@ -241,8 +241,8 @@ def _layout(data: bytes, parameters: Parameters, shape: Shape, split: Split) -> 
     fields = [(WORD_OF_FIRST, Kind.FIRST), (WORD_OF_LAST, Kind.LAST)]
     for group, name, type_, size, kind in FIELDS:
         parameter = parameters.get(group, name)
-        wanted = kind != Kind.ROTATIONS or shape.n_rotations
-        if parameter and wanted and (parameter.type, len(parameter.data)) == (type_, size):
+        is_needed = kind != Kind.ROTATIONS or shape.n_rotations
+        if parameter and is_needed and (parameter.type, len(parameter.data)) == (type_, size):
             fields.append((parameter.at, kind))
     gap, tail = b"", data[shape.stop :]
     if shape.n_rotations:

@@ -97,7 +97,7 @@ class Layout:
     """A template and a detail, parsed; see C3dTemplate and C3dDetail.
 
     ``head`` here has the fields in place; ``tail`` is all that lies behind the data; ``outputs`` is
-    that of C3dOutputsTemplate, () where all points are points.
+    that of C3dOutputsTemplate, () if all points are points.
     """
 
     order: Order
@@ -195,17 +195,17 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
     if (shared.rotations and shared.word != 4) or (shared.gap and not shared.rotations):
         raise FormatError("source template: rotations of integers, or a gap without rotations")
     head, fields = bytearray(shared.head), []
-    end = taken = 0
+    end = n_used = 0
     for entry in shared.fields:
         kind = Kind(entry.kind)
         if not end <= entry.at <= len(head) - kind.size:  # C3D-10, C3D-11
             raise FormatError(f"source template: a field at {entry.at}, {end} or more expected")
         end = entry.at + kind.size
-        head[entry.at : end] = own.values[taken : taken + kind.size]
-        taken += kind.size
+        head[entry.at : end] = own.values[n_used : n_used + kind.size]
+        n_used += kind.size
         fields.append((entry.at, kind))
-    if taken != len(own.values) or len(head) != len(shared.head):  # C3D-12
-        raise FormatError(f"source detail: {len(own.values)} bytes of fields, not {taken}")
+    if n_used != len(own.values) or len(head) != len(shared.head):  # C3D-12
+        raise FormatError(f"source detail: {len(own.values)} bytes of fields, not {n_used}")
     return Layout(
         Order(shared.processor),
         shared.word,
@@ -227,10 +227,10 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
 
 def ordered_fields(fields: Sequence[tuple[int, Kind]], size: int) -> tuple[tuple[int, Kind], ...]:
     """The fields that lie within ``size`` bytes, sorted, without those that overlap others."""
-    kept: list[tuple[int, Kind]] = []
+    ordered: list[tuple[int, Kind]] = []
     end = 0
     for at, kind in sorted(fields):
         if end <= at <= size - kind.size:
-            kept.append((at, kind))
+            ordered.append((at, kind))
             end = at + kind.size
-    return tuple(kept)
+    return tuple(ordered)

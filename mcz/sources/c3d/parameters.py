@@ -106,7 +106,7 @@ class Parameters:
         return float(parameter.data[0])
 
     def count(self, group: str, name: str) -> int | None:
-        """The first number of a parameter where it is a count, None if it is none."""
+        """The first number of a parameter if it is a count, None if it is none."""
         value = self.number(group, name)
         return int(value) if value is not None and 0 <= value < 2**32 else None
 
@@ -162,7 +162,7 @@ class Parameters:
 
 
 def decode_texts(texts: list[bytes]) -> tuple[list[str], str]:
-    """Texts and their encoding: "utf-8" where all of them are, otherwise "latin-1"."""
+    """Texts and their encoding: "utf-8" if all of them are, otherwise "latin-1"."""
     encoding = "utf-8"
     try:
         b"".join(texts).decode(encoding)
@@ -243,7 +243,7 @@ def _parameter(data: bytes, at: int, stop: int) -> Parameter | None:
     return Parameter(kind, dims, first, data[first : first + size])
 
 
-NAME = "outputs"
+OUTPUTS = "outputs"
 UNITS_OF = {  # parameters of POINT that list outputs, and the one that holds their unit
     "ANGLES": "ANGLE_UNITS",
     "FORCES": "FORCE_UNITS",
@@ -314,7 +314,7 @@ def groups_of(parameters: Parameters) -> dict[bytes, tuple[str, ...]]:
 
 
 def unit_of(parameters: Parameters, groups: Sequence[str]) -> str:
-    """The unit of an output that these lists have, "" where it is unknown or they disagree."""
+    """The unit of an output that these lists have, "" if it is unknown or they disagree."""
     texts = [next(iter(parameters.texts("POINT", UNITS_OF[group])), b"") for group in groups]
     units = {text.decode("latin-1") for text in texts}
     return units.pop() if len(units) == 1 else ""
@@ -331,7 +331,7 @@ class Listed:
 def describe_outputs(outputs: Signal | None) -> Listed:
     """Labels and lists that say what ``outputs``, channels ``NAME x``, ``NAME y``, ``NAME z``, are.
 
-    The unit of an output tells its list. Where there are more units than lists, the last list says
+    The unit of an output tells its list. If there are more units than lists, the last list says
     none. Raises MotionError for other channels.
     """
     channels = outputs.channels or () if outputs is not None else ()
@@ -352,7 +352,7 @@ def describe_outputs(outputs: Signal | None) -> Listed:
 
 
 def _list_of(unit: str, groups: dict[str, tuple[list[str], str]]) -> str:
-    """The list for outputs of a unit: where it is usual, else one that has it or is free."""
+    """The list for outputs of a unit: if it is usual, else one that has it or is free."""
     usual = [name for pattern, name in USUAL if re.match(pattern, unit)]
     for group in [*usual, *reversed(UNITS_OF)]:
         if groups.get(group, ([], unit))[1] == unit:

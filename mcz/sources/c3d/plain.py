@@ -1,6 +1,6 @@
 """A motion that did not come from C3D, laid out as a plain C3D file.
 
-Intel byte order, floats; integers where all coordinates are multiples of one scale and all analog
+Intel byte order, floats; integers if all coordinates are multiples of one scale and all analog
 samples are 16-bit integers. The parameter section holds POINT, TRIAL, ANALOG and FORCE_PLATFORM.
 """
 
@@ -24,13 +24,13 @@ from mcz.sources.c3d.parameters import (
     INTEGER,
     INTEL,
     MAX_BLOCKS,
+    OUTPUTS,
     TEXT,
     UNITS_OF,
     Listed,
     Order,
     describe_outputs,
 )
-from mcz.sources.c3d.parameters import NAME as OUTPUTS
 from mcz.sources.c3d.restore import field_bytes, valid_points
 from mcz.sources.c3d.shape import COUNTED, WORD_OF_FIRST, WORD_OF_LAST
 
@@ -52,8 +52,8 @@ def plain(motion: Motion) -> Motion:
             raise MotionError(f"C3D holds markers only; joint {joint.name!r} is not a marker")
     others = {signal.role: signal for signal in motion.signals[1:]}
     if len(others) < len(motion.signals) - 1 or not set(others) <= set(KNOWN):
-        given = ", ".join(signal.name for signal in motion.signals[1:])
-        raise MotionError(f"C3D cannot hold all of the signals {given}")
+        unsupported = ", ".join(signal.name for signal in motion.signals[1:])
+        raise MotionError(f"C3D cannot hold all of the signals {unsupported}")
     residuals, outputs = others.get("residuals"), others.get(OUTPUTS)
     analog, scaling = _analog(others.get("analog"))
     placed = [motion.signals[0], *([outputs] if outputs is not None else [])]
@@ -100,7 +100,7 @@ def plain(motion: Motion) -> Motion:
 
 
 def _analog(signal: Signal | None) -> tuple[Signal | None, Scaling | None]:
-    """The analog signal as stored and what its words mean, or its values, where C3D cannot say."""
+    """The analog signal as stored and what its words mean, or its values, if C3D cannot say."""
     if signal is None or signal.scaling is None:
         return signal, None
     offsets, scaling = signal.scaling.offsets, signal.scaling

@@ -215,7 +215,7 @@ def _channels(parameters: Parameters, n: int) -> Iterator[AnalogChannel]:
 
 
 def _offset(parameters: Parameters, number: float) -> float:
-    """An offset with the sign that is meant: as the words, it has none where they have none.
+    """An offset with the sign that is meant: as the words, it has none if they have none.
 
     -32768 is the middle of 16 bits without a sign, whatever ANALOG:FORMAT says.
     """
@@ -298,7 +298,7 @@ class Event:
 
     ``time`` is in seconds on the clock of the frames, ``mcz.times``: frame number 1 is at 0.
     ``context`` is the side or sort ("Left", "Right", "General"), ``subject`` who did it,
-    ``description`` what the label means; each is "" where the file does not say.
+    ``description`` what the label means; each is "" if the file does not say.
     """
 
     label: str

@@ -1,7 +1,7 @@
 """Signals, template and detail -> the bytes of a C3D file.
 
 SPEC.md, "Source reconstruction", is normative. The data section is made of the signals; all else is
-kept as it is, but for the fields that count frames, which follow the motion where it has other
+kept as it is, but for the fields that count frames, which follow the motion if it has other
 frames than the file had.
 """
 
@@ -17,8 +17,7 @@ from mcz.model.motion import Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Items, Values
 from mcz.sources.c3d.layout import Kind, Layout, parse_layout
-from mcz.sources.c3d.parameters import BLOCK, Order
-from mcz.sources.c3d.parameters import NAME as OUTPUTS
+from mcz.sources.c3d.parameters import BLOCK, OUTPUTS, Order
 from mcz.sources.c3d.shape import COUNTED, ROTATION_WORDS
 
 INTEGERS = (GridKind.SCALED, GridKind.INTEGER)
@@ -38,14 +37,14 @@ def restore(motion: Motion, source: Source) -> bytes:
         signal = _signal(motion, "rotations", layout.n_rotations * ROTATION_WORDS, layout.ratio)
         rotations = _words(signal, layout).tobytes()
     if motion.n_frames == layout.n_frames:  # C3D-15
-        behind = layout.gap + rotations + layout.tail
+        rest = layout.gap + rotations + layout.tail
     else:
         if (layout.head[:1] or b"\0")[0] * BLOCK > len(layout.head):
             raise MotionError("the parameters follow the data, so only a whole clip can be written")
-        behind = _padding(len(layout.head) + len(data)) + rotations + _padding(len(rotations))
-        kept = layout.tail.rstrip(b"\0")
-        behind += kept + _padding(len(kept))
-    return _head(motion, layout, len(data)) + data + behind
+        rest = _padding(len(layout.head) + len(data)) + rotations + _padding(len(rotations))
+        trimmed_tail = layout.tail.rstrip(b"\0")
+        rest += trimmed_tail + _padding(len(trimmed_tail))
+    return _head(motion, layout, len(data)) + data + rest
 
 
 def _head(motion: Motion, layout: Layout, size: int) -> bytes:
@@ -71,7 +70,7 @@ def _padding(size: int) -> bytes:
 
 
 def field_bytes(order: Order, kind: Kind, first: int, n_frames: int, rotations_at: int) -> bytes:
-    """The bytes of a field where ``n_frames`` frames from number ``first`` on are there."""
+    """The bytes of a field if ``n_frames`` frames from number ``first`` on are there."""
     last = first + n_frames - 1  # C3D-15
     match kind:
         case Kind.COUNT_FLOAT:
@@ -149,7 +148,7 @@ def _check_signal(signal: Signal, n_channels: int, per_frame: int) -> Signal:
 def _residuals(motion: Motion, layout: Layout, parts: list[Signal]) -> Signal:
     """The residual words of the points of all ``parts``, one part after the other.
 
-    Where the motion has none, 0 for valid points and -1 for others.
+    If the motion has none, 0 for valid points and -1 for others.
     """
     if any(signal.of == 0 for signal in motion.signals):
         return _signal(motion, "residuals", layout.n_points, 1)
@@ -175,10 +174,10 @@ def _with_gaps(points: Signal, residuals: Values) -> Signal:
     if valid is None:
         return points
     values = points.values.reshape(*valid.shape, 3)  # either may be 0
-    lost = ~valid & (residuals >= 0) & ~np.isnan(values).any(axis=2)
-    if not lost.any():
+    is_gap = ~valid & (residuals >= 0) & ~np.isnan(values).any(axis=2)
+    if not is_gap.any():
         return points
-    gapped = np.where(lost[:, :, None], np.nan, values)
+    gapped = np.where(is_gap[:, :, None], np.nan, values)
     return replace(points, values=gapped.reshape(points.values.shape))
 
 
@@ -195,9 +194,9 @@ def _words(signal: Signal, layout: Layout, unsigned: bool = False) -> Items:
     """The words of a signal, (rows, channels), in the byte order of the file."""
     grids = (*signal.grids, *(grid for _, _, grid in signal.grid_changes))
     kinds = {grid.kind for grid in grids}
-    wanted = INTEGERS if layout.word == 2 else (layout.order.grid.kind,)
-    if not kinds <= set(wanted):  # C3D-14
-        names = " or ".join(kind.name for kind in wanted)
+    allowed = INTEGERS if layout.word == 2 else (layout.order.grid.kind,)
+    if not kinds <= set(allowed):  # C3D-14
+        names = " or ".join(kind.name for kind in allowed)
         raise FormatError(f"source template: signal {signal.name!r} is not on a grid {names}")
     integral = signal.values.dtype == np.int64
     ordinals = signal.values.astype(np.int64) if integral else signal.to_ordinals()[0]  # C3D-15

@@ -18,7 +18,7 @@ from mcz.sources.c3d.parameters import BLOCK, WORD_OF_START, Order, Parameters
 
 WORD_OF_FIRST, WORD_OF_LAST = 6, 8  # offsets of the frame numbers in the header
 COUNTED = 65_535  # the most that a word can count
-MAX_EMPTY_SIZE = 2**16  # bytes of a frame, where the file has none and is smaller than that
+MAX_EMPTY_SIZE = 2**16  # bytes of a frame, if the file has none and is smaller than that
 ROTATION_WORDS = 17  # floats of a rotation: a 4 x 4 matrix and its reliability
 
 
@@ -57,7 +57,7 @@ class Shape:
 
 
 def find_shape(data: bytes, parameters: Parameters) -> Shape:
-    """The shape of the data section; raises SourceError where there is none."""
+    """The shape of the data section; raises SourceError if there is none."""
     order = parameters.order
     counts = list(_counts(data, parameters))
     shapes = list(_candidates(data, parameters))
@@ -156,7 +156,7 @@ def _fit(data: bytes, shape: Shape, counts: list[int], parameters: Parameters) -
 
 
 def _first(data: bytes, parameters: Parameters) -> int:
-    """The number of the first frame: the header's, or TRIAL's where it does not fit a word."""
+    """The number of the first frame: the header's, or TRIAL's if it does not fit a word."""
     first, trial = parameters.order.integer(data, WORD_OF_FIRST), parameters.first_frame
     if trial is not None and trial > COUNTED and first in (COUNTED, trial & COUNTED):
         return trial
@@ -164,7 +164,7 @@ def _first(data: bytes, parameters: Parameters) -> int:
 
 
 def _with_rotations(data: bytes, shape: Shape, parameters: Parameters) -> Shape:
-    """The shape with the rotations that ROTATION declares, where all of them are there."""
+    """The shape with the rotations that ROTATION declares, if all of them are there."""
     used, block, ratio = (
         parameters.count("ROTATION", name) for name in ("USED", "DATA_START", "RATIO")
     )

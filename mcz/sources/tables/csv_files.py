@@ -70,10 +70,10 @@ def is_motion(data: bytes) -> bool:
     if kind != "csv":
         return kind is not None
     lines = _lines(data)
-    found = first_row(lines)
-    if found is None:
+    row = first_row(lines)
+    if row is None:
         return False
-    number, separator, _ = found
+    number, separator, _ = row
     cells = [cells_of(line, separator) for _, line in lines[number:] if not is_blank(line)]
     if separator is not None and all(map(is_row, cells)):
         return True
@@ -113,7 +113,7 @@ def _check_line_ends(data: bytes) -> None:
 def write(motion: Motion) -> bytes:
     """The CSV file that ``motion`` was read from, with its values.
 
-    Raises MotionError where it was read from none: ``mcz.files.tables`` writes others.
+    Raises MotionError if it was read from none: ``mcz.files.tables`` writes others.
     """
     if motion.source is None or motion.source.format not in NAMES:
         raise MotionError(
@@ -159,7 +159,7 @@ class _Head:
 def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     """The motion in a plain CSV file; ``name`` becomes its name.
 
-    A frame rate is stated where there is a column of uniform times. Raises SourceError, with the
+    A frame rate is stated if there is a column of uniform times. Raises SourceError, with the
     number of the line.
     """
     encoding = text_encoding(data)
@@ -186,8 +186,8 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     names = [joint.name for joint in skeleton.joints]
     start, stop = head.labels
     marked = data[:start] + names_in(data[start:stop], names) + data[stop : head.rows]
-    said = table.missing, times.clock
-    section = section_of((marked, data[: head.rows]), said, rows, names, range(1 + len(more)))
+    header, missing_and_clock = (marked, data[: head.rows]), (table.missing, times.clock)
+    section = section_of(header, missing_and_clock, rows, names, range(1 + len(more)))
     motion = Motion(
         skeleton,
         (read_columns(data, rows, range(len(values))), *more),
@@ -209,7 +209,7 @@ def counts_rows(name: str) -> bool:
 
 
 def _check_decimals(data: bytes, rows: Rows, n_values: int, labels: Sequence[str]) -> None:
-    """Refuse texts beside integers alone where nothing counts the rows: a list is no motion."""
+    """Refuse texts beside integers alone if nothing counts the rows: a list is no motion."""
     present = rows.stop[:, :n_values] > 0
     start, stop = rows.start[:, :n_values][present], rows.stop[:, :n_values][present]
     if b"." not in b"".join(data[a:b] for a, b in zip(start, stop, strict=True)):
@@ -227,9 +227,9 @@ def _scalars(head: _Head, values: Sequence[int]) -> Skeleton:
 
 
 def _markers(head: _Head, values: Sequence[int]) -> Skeleton | None:
-    """Markers where all columns are x, y and z of them, such as LASI.x, LASI.y, LASI.z.
+    """Markers if all columns are x, y and z of them, such as LASI.x, LASI.y, LASI.z.
 
-    None where one is not, and where a name or unit says that it is of no position.
+    None if one is not, and if a name or unit says that it is of no position.
     """
     joints, units = [], set()
     for k in range(0, len(values), 3):

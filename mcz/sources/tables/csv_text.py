@@ -46,8 +46,8 @@ def cells_of(line: bytes, separator: bytes | None) -> list[bytes]:
 
 
 def whole_cells(lines: Sequence[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
-    """``lines``, their offsets and bytes, where those of one quoted cell are one line."""
-    found: list[tuple[int, bytes]] = []
+    """``lines``, their offsets and bytes, with the lines of a quoted cell joined."""
+    cells: list[tuple[int, bytes]] = []
     n_joined = 0
     for number, (at, line) in enumerate(lines):
         if n_joined:
@@ -57,14 +57,14 @@ def whole_cells(lines: Sequence[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
             below = [text for _, text in lines[number + 1 : number + MOST_LINES]]
             n_joined = next((k for k, text in enumerate(below, 1) if text.count(b'"') % 2), 0)
             line = b"".join((line, *below[:n_joined]))
-        found.append((at, line))
-    return found
+        cells.append((at, line))
+    return cells
 
 
 def cell_spans(line: bytes, separator: bytes, most: int) -> tuple[list[tuple[int, int]], int]:
     """Start and stop of the first ``most`` cells, blanks and quotes around them left out.
 
-    Also returns where the next cell begins, ``len(line)`` where there is none. A separator within
+    Also returns where the next cell begins, ``len(line)`` if there is none. A separator within
     quotes is text. A blank cell lies at its end.
     """
     spans: list[tuple[int, int]] = []
@@ -76,8 +76,8 @@ def cell_spans(line: bytes, separator: bytes, most: int) -> tuple[list[tuple[int
             start, stop = quoted.span(1)
             end = quoted.end()
         else:
-            found = line.find(separator, at)
-            start, stop = at, found if found >= 0 else size
+            end = line.find(separator, at)
+            start, stop = at, end if end >= 0 else size
             end = stop
         bare = line[start:stop].strip()
         start = start + line[start:stop].index(bare) if bare else stop
@@ -98,7 +98,7 @@ def count_columns(heads: Sequence[Sequence[str]], rows: bytes, separator: bytes 
 
     ``heads``: the cells of the lines above the rows. Spreadsheets fill all lines up to one width,
     so a blank cell at the end of a line is no column. Beyond the heads, all rows are looked at,
-    where the first one has more cells.
+    if the first one has more cells.
     """
     named = max((_filled(cells) for cells in heads), default=0)
     if len(cells_of(rows[: rows.find(b"\n") + 1 or len(rows)], separator)) <= named:
@@ -122,12 +122,12 @@ def first_row(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes | None, in
 
     Some columns may be text. A line of names may look like numbers; it has no other one below.
     """
-    found = _first_numbers(lines)
-    if found is None and not has_decimal_commas(lines, (b";", b"\t")):
-        found = _last_row(lines)
-    if found is None:
+    row = _first_numbers(lines)
+    if row is None and not has_decimal_commas(lines, (b";", b"\t")):
+        row = _last_row(lines)
+    if row is None:
         return None
-    number, separator, n_cells = found
+    number, separator, n_cells = row
     if separator is not None:
         number = _first_like(lines, number, separator)
     return number, separator, n_cells
@@ -157,14 +157,14 @@ def _first_numbers(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes | Non
     """The first line whose cells are all numbers or blank."""
     first = None
     for number, (_, line) in enumerate(lines[:LOOKED_AT]):
-        found = [
+        candidates = [
             (len(cells), separator)
             for separator in SEPARATORS
             if is_row(cells := _some_cells(line, separator))
         ]
-        if not found:
+        if not candidates:
             continue
-        n_cells, separator = max(found, key=lambda entry: entry[0])
+        n_cells, separator = max(candidates, key=lambda entry: entry[0])
         first = first or (number, separator, n_cells)
         below = next((line for _, line in lines[number + 1 :] if line.strip()), None)
         if (
@@ -192,21 +192,21 @@ def _last_row(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes, int] | No
     if len(looked_at) < 2:
         return None
     number = looked_at[-1]
-    found = [
+    candidates = [
         (len(cells), separator)
         for separator in (b",", b";", b"\t")
         if len(cells := _some_cells(lines[number][1], separator)) > 1
         and any(map(_NUMBER.fullmatch, cells))
         and len(_some_cells(lines[looked_at[-2]][1], separator)) == len(cells)
     ]
-    if not found:
+    if not candidates:
         return None
-    n_cells, separator = max(found, key=lambda entry: entry[0])
+    n_cells, separator = max(candidates, key=lambda entry: entry[0])
     return number, separator, n_cells
 
 
 def is_like(cells: Sequence[bytes], others: Sequence[bytes]) -> bool:
-    """Return whether a line has as many cells as another, and numbers where that has numbers."""
+    """Return whether a line has as many cells as another, and numbers if that has numbers."""
     if len(cells) != len(others):
         return False
     pairs = [cell for cell, other in zip(cells, others, strict=True) if _NUMBER.fullmatch(other)]
@@ -214,20 +214,20 @@ def is_like(cells: Sequence[bytes], others: Sequence[bytes]) -> bool:
 
 
 def _some_cells(line: bytes, separator: bytes | None) -> list[bytes]:
-    """The cells of a line, none where these are too many."""
+    """The cells of a line, none if these are too many."""
     n = len(line) // 2 if separator is None else line.count(separator)
     return cells_of(line, separator) if n < MOST_CELLS else []
 
 
 def is_row(cells: Sequence[bytes]) -> bool:
     """Return True if the cells are numbers, at least one, and placeholders for missing ones."""
-    found = False
+    has_number = False
     for cell in cells:
         if _NUMBER.fullmatch(cell):
-            found = True
+            has_number = True
         elif cell not in NOT_THERE:
             return False
-    return found
+    return has_number
 
 
 def check_points(cells: Sequence[bytes], line: int) -> None:
@@ -242,9 +242,9 @@ def check_points(cells: Sequence[bytes], line: int) -> None:
 
 
 def check_names(names: Sequence[str], row: bytes, separator: bytes | None, line: int) -> str:
-    """A note where ``line`` has fewer names than the row below it has cells; "" where it has not.
+    """A note if ``line`` has fewer names than the row below it has cells; "" if it has not.
 
-    Raises SourceError where there are two cells for each name: numbers with decimal commas.
+    Raises SourceError if there are two cells for each name: numbers with decimal commas.
     """
     cells = cells_of(row, separator)
     if not 1 < len(names) < len(cells):

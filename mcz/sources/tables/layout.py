@@ -222,7 +222,7 @@ def _section(shared: SectionFields, own: Detail, sizes: Sequence[int]) -> Sectio
 
 
 def parsed_clock(shared: SectionFields) -> Clock | None:
-    """The clock of a section, None where it has none; FormatError for a grid without decimals."""
+    """The clock of a section, None if it has none; FormatError for a grid without decimals."""
     fields = shared.clock
     if fields is None:
         return None
@@ -232,7 +232,7 @@ def parsed_clock(shared: SectionFields) -> Clock | None:
 
 
 def fill(header: bytes, names: Sequence[str], count: bytes) -> bytes:
-    """``header`` with its marks replaced; FormatError where there are more than joints."""
+    """``header`` with its marks replaced; FormatError if there are more than joints."""
     out, at, size = [], 0, len(header)
     joint = number = 0
     for match in _MARKS.finditer(header):

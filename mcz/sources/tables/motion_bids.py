@@ -115,7 +115,7 @@ def _rows(path: Path) -> list[Mapping[str, str]]:
 
 
 def _markers(rows: Sequence[Mapping[str, str]]) -> Skeleton | None:
-    """Markers, where all channels are positions in one known unit."""
+    """Markers, if all channels are positions in one known unit."""
     units = {row.get("units", "") for row in rows}
     unit_cm = UNIT_CM.get(next(iter(units))) if len(units) == 1 else None
     points = [row.get("tracked_point", "") for row in rows[::3]]
@@ -139,7 +139,7 @@ def _scalars(rows: Sequence[Mapping[str, str]], skeleton: Skeleton) -> Skeleton:
 
 
 def _rate(path: Path) -> Fraction | None:
-    """The sampling frequency; None where it is not stated."""
+    """The sampling frequency; None if it is not stated."""
     try:
         frequency = json.loads(_text(path)).get("SamplingFrequency")
         value = None if frequency is None else float(frequency)

@@ -201,13 +201,13 @@ def _without_kind(channel: Channel) -> Channel:
 
 def _without(objects: Sequence[_Object], columns: Sequence[int | None]) -> list[_Object]:
     """The objects without these columns, and without those that have no other."""
-    found = []
+    rest = []
     for one in objects:
-        kept = [k for k, column in enumerate(one.columns) if column not in columns]
-        one.columns = [one.columns[k] for k in kept]
-        one.channels = [one.channels[k] for k in kept]
-        found += [one] if kept else []
-    return found
+        positions = [k for k, column in enumerate(one.columns) if column not in columns]
+        one.columns = [one.columns[k] for k in positions]
+        one.channels = [one.channels[k] for k in positions]
+        rest += [one] if positions else []
+    return rest
 
 
 def _channel(what: str, axis: str, *, euler: bool) -> Channel:
@@ -229,7 +229,7 @@ def _sort_rotations(one: _Object, order: str) -> None:
 
 
 def _skeleton(head: _Head, objects: Sequence[_Object]) -> Skeleton:
-    """Joints without a parent where all is seen from one origin."""
+    """Joints without a parent if all is seen from one origin."""
     is_local = head.said.get("coordinate space", "").lower() in LOCAL
     by_id: dict[str, int] = {}
     joints = []

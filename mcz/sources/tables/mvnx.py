@@ -360,8 +360,8 @@ def _split_text(
 ) -> tuple[Rows, dict[int, TextColumn]]:
     """``rows`` with numbers in place of attributes that are text, and these by their column."""
     places = [columns.column(name) for name in columns.attributes]
-    found = odd_cells(data, of_columns(rows, places)).text_columns() if places else []
-    chosen = [places[k] for k in found]
+    text_cells = odd_cells(data, of_columns(rows, places)).text_columns() if places else []
+    chosen = [places[k] for k in text_cells]
     if not chosen:
         return rows, {}
     time = columns.n_columns - (TIME in columns.columns)

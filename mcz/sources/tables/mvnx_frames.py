@@ -221,13 +221,13 @@ def _parts(data: bytes, at: int) -> tuple[list[Part], int]:
 
 def _attributes(data: bytes, start: int, stop: int) -> dict[str, tuple[int, int]]:
     """The attributes of a frame, as ``@name``, and the place of each value."""
-    found: dict[str, tuple[int, int]] = {}
+    spans: dict[str, tuple[int, int]] = {}
     for match in _ATTRIBUTE.finditer(data, start, stop):
         name = "@" + match["name"].decode()
-        if name in found:
+        if name in spans:
             raise SourceError("a frame has the same attribute twice", line=line_of(data, start))
-        found[name] = match.span("single" if match["double"] is None else "double")
-    return found
+        spans[name] = match.span("single" if match["double"] is None else "double")
+    return spans
 
 
 def _all_sizes(data: bytes, at: int) -> dict[str, int]:
@@ -255,8 +255,8 @@ def columns_of(sizes: Mapping[str, int], numbered: bool) -> FrameColumns:
     present = [name for name in _KINDS if name in sizes]
     counts = {sizes[name] / len(_KINDS[name]) for name in present}
     if len(counts) != 1 or (n_segments := counts.pop()) % 1:
-        found = ", ".join(f"{sizes[name]} numbers of {name}" for name in present) or "neither"
-        raise SourceError(f"expected positions and orientations of segments, but found {found}")
+        parts = ", ".join(f"{sizes[name]} numbers of {name}" for name in present) or "neither"
+        raise SourceError(f"expected positions and orientations of segments, but found {parts}")
     kinds = tuple(kind for name in present for kind in _KINDS[name])
     columns: dict[str, Sequence[int]] = {}
     first = 0

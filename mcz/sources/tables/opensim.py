@@ -49,7 +49,7 @@ def read_mot(data: bytes, name: str = "motion") -> Motion:
 def read_sto(data: bytes, name: str = "motion") -> Motion:
     """The motion in a STO file; ``name`` becomes its name.
 
-    A frame rate is stated where the times are uniform. Raises SourceError, with the number of the
+    A frame rate is stated if the times are uniform. Raises SourceError, with the number of the
     line.
     """
     return _read(data, name, "sto")

@@ -191,7 +191,7 @@ def _with_source(
 ) -> Motion:
     """``motion`` as its first signal and its times, with the source.
 
-    The times are a clock, or a signal where frame numbers do not give them.
+    The times are a clock, or a signal if frame numbers do not give them.
     """
     clock, times = _times(motion)
     signals = (motion.signals[0], *times)

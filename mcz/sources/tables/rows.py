@@ -50,7 +50,7 @@ def begins_with_number(line: bytes) -> bool:
 class RowCells:
     """The tokens of the row that begins at an offset; see ``rows.Frames``.
 
-    ``columns``: of each cell its columns, several where it holds several numbers. ``separator``
+    ``columns``: of each cell its columns, several if it holds several numbers. ``separator``
     None: blanks. ``blanks``: cells may be empty. ``free``: the first one, too.
     """
 
@@ -89,24 +89,24 @@ class RowCells:
         most, first = len(self.columns), at
         if self.separator is None:
             words = islice(_WORDS.finditer(line), most + 1)
-            found = [(at + m.start(), at + m.end()) for m in words]
-            rest = line if len(found) > most else b""
+            spans = [(at + m.start(), at + m.end()) for m in words]
+            rest = line if len(spans) > most else b""
         elif b'"' in line:
             spans, end = cell_spans(line.rstrip(b"\r\n"), self.separator, most)
             rest = line[end:].strip(_AROUND + self.separator)
-            found = [(at + start, at + stop) for start, stop in spans]
+            spans = [(at + start, at + stop) for start, stop in spans]
         else:
             cells = line.rstrip(b"\r\n").split(self.separator, most)
             rest = cells.pop().strip(_AROUND + self.separator) if len(cells) > most else b""
-            found = []
+            spans = []
             for cell in cells:
                 bare = cell.strip(_BLANKS)
                 start = at + (cell.index(bare) if bare else len(cell))
-                found.append((start, start + len(bare)))
+                spans.append((start, start + len(bare)))
                 at += len(cell) + len(self.separator)
         if rest:
             raise SourceError(f"more than {most} cells", line=line_of(self.data, first))
-        return found
+        return spans
 
     def _cell(self, start: int, stop: int, columns: Sequence[int]) -> list[Token]:
         if start == stop and (len(columns) > 1 or not self.blanks):
@@ -154,7 +154,7 @@ def read_table(
     """Read all rows of ``data`` from offset ``at`` on; ``free``: they may begin with none.
 
     ``numbers_at``: in front of which column the numbers of text columns come; None: text is left
-    where it is, and no number. Raises SourceError for what is no table, and where ``read_rows``
+    if it is, and no number. Raises SourceError for what is no table, and if ``read_rows``
     does.
     """
     whole = data
@@ -179,7 +179,7 @@ def read_table(
     if n_missing <= np.count_nonzero(blank):
         missing = b""
     elif blank.any():  # both: what is blank is left out of the layout
-        rows = attempt(False)  # which may have others, where a row had blanks alone
+        rows = attempt(False)  # which may have others, if a row had blanks alone
         blank = np.zeros(rows.start.shape, np.bool_)
     gone = blank
     if missing:
@@ -189,8 +189,8 @@ def read_table(
     if not texts or numbers_at is None:
         return TableRows(rows, missing)
     cell_numbers = {column: list(columns).index([column]) + 1 for column in texts}
-    rows, found = split_text(data, rows, cell_numbers, numbers_at)
-    return TableRows(rows, missing, tuple(found))
+    rows, text_columns = split_text(data, rows, cell_numbers, numbers_at)
+    return TableRows(rows, missing, tuple(text_columns))
 
 
 def followed_by(rows: Rows, rest: bytes) -> Rows:
@@ -237,7 +237,7 @@ def _without(rows: Rows, gone: Bools) -> Rows:
 
 
 def without_zeros(data: bytes, rows: Rows, groups: Sequence[Sequence[int]]) -> Rows:
-    """``rows`` where the zeros that end every number of a group of columns belong to the gaps.
+    """``rows`` with the zeros that end every number of a group of columns moved to the gaps.
 
     ``%.6f`` of what has 3 decimals prints three zeros that say nothing.
     """
@@ -296,7 +296,7 @@ def _move_pattern(pattern: Pattern, zeros: dict[int, bytes]) -> Pattern:
 
 
 def _shared_zeros(data: bytes, rows: Rows, columns: Sequence[int]) -> bytes:
-    """The zeros that end all tokens of the columns, with the point where nothing is before them."""
+    """The zeros that end all tokens of the columns, with the point if nothing is before them."""
     from mcz.model.numbers import decimal_kernels as kernels
 
     chosen = list(columns)

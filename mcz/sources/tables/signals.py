@@ -123,8 +123,8 @@ def _by_column(mask: Bools) -> list[tuple[slice | Ints, Ints]]:
         rows = np.arange(n_rows)
         return [(slice(c, None, n_columns), rows) for c in range(n_columns)]
     number = np.cumsum(mask).reshape(mask.shape) - 1
-    found = [np.flatnonzero(mask[:, c]) for c in range(n_columns)]
-    return [(number[rows, c], rows) for c, rows in enumerate(found)]
+    rows_of_columns = [np.flatnonzero(mask[:, c]) for c in range(n_columns)]
+    return [(number[rows, c], rows) for c, rows in enumerate(rows_of_columns)]
 
 
 def _common_grid(
@@ -149,7 +149,7 @@ def _common_grid(
 def _by_blocks(
     tokens: Tokens, row: Ints, grid: Grid, printed: Bools, n_each: int
 ) -> tuple[list[tuple[int, Grid]], Bools]:
-    """Changes (row, grid) of a column where another grid saves exceptions; what is printed then.
+    """Changes (row, grid) of a column if another grid saves exceptions; what is printed then.
 
     They lie between frames of ``n_each`` rows.
     """
@@ -193,12 +193,12 @@ def read_columns(data: bytes, rows: Rows, columns: Sequence[int], n_each: int = 
         return signal
     grids = list(signal.grids)
     exceptions = signal.exceptions
-    kept = ~np.isin(exceptions.channels, list(better_columns))
+    is_kept = ~np.isin(exceptions.channels, list(better_columns))
     entries = [
         *zip(
-            exceptions.rows[kept].tolist(),
-            exceptions.channels[kept].tolist(),
-            [text for text, keep in zip(exceptions.texts, kept.tolist(), strict=True) if keep],
+            exceptions.rows[is_kept].tolist(),
+            exceptions.channels[is_kept].tolist(),
+            [text for text, keep in zip(exceptions.texts, is_kept.tolist(), strict=True) if keep],
             strict=True,
         )
     ]
@@ -247,7 +247,7 @@ def text_note(labels: Sequence[str]) -> str:
 
 
 def text_columns(metadata: Mapping[str, str]) -> str:
-    """The names of the columns of text of a table that was read; "" where it has none."""
+    """The names of the columns of text of a table that was read; "" if it has none."""
     match = _TEXT_NOTE.search(metadata.get("source-note", ""))
     return match[1] if match else ""
 

@@ -1,4 +1,4 @@
-"""The Source of a table that was read, its header with marks where these give the same bytes."""
+"""The Source of a table that was read, its header with marks if these give the same bytes."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def section_of(
 ) -> Section:
     """A section of a table whose columns are those of ``signals``.
 
-    ``header``: with marks, and as it is; the second is taken where the first does not give it.
+    ``header``: with marks, and as it is; the second is taken if the first does not give it.
     ``beside``: what stands for a missing value, and the clock.
     """
     marked, whole = with_phrases(header[0]), header[1]
@@ -167,7 +167,7 @@ class TableNotes:
     sections: tuple[SectionNotes, ...]
 
     def cut(self, start: int, stop: int) -> bytes:
-        """TABLE_NOTES of the frames start <= f < stop; b"" where all of them are usual."""
+        """TABLE_NOTES of the frames start <= f < stop; b"" if all of them are usual."""
         fields = [section.cut(start, stop) for section in self.sections]
         while fields and not (fields[-1].patterns or fields[-1].texts):
             fields.pop()

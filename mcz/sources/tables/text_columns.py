@@ -102,7 +102,7 @@ def refuse_commas(data: bytes, odd: OddCells, start: Ints, text_columns: Sequenc
 class _Shape:
     """A text: literals around its numbers, and the column of each number.
 
-    ``padded``: sample text with the same padding, b"" where the column is not padded.
+    ``padded``: sample text with the same padding, b"" if the column is not padded.
     """
 
     literals: tuple[bytes, ...]
@@ -120,7 +120,7 @@ def split_text(
     """
     shapes: list[tuple[Ints, list[_Shape]]] = []  # of each column: the shape of each row, and all
     numbers: list[tuple[Ints, Ints]] = []  # start and stop of each column of numbers
-    found = []
+    text_columns = []
     padded = {
         r.column + k for p in rows.patterns for r in p.runs if r.width for k in range(r.n_columns)
     }
@@ -129,13 +129,17 @@ def split_text(
         split = _split(data, *places, len(numbers), column in padded)
         shapes.append(split[:2])
         numbers += split[2]
-        found.append(TextColumn(column, len(split[2])))
-    kept = [c for c in range(rows.start.shape[1]) if c not in set(columns)]
-    before = sum(c < at for c in kept)
-    place = {c: k + (len(numbers) if k >= before else 0) for k, c in enumerate(kept)}
+        text_columns.append(TextColumn(column, len(split[2])))
+    others = [c for c in range(rows.start.shape[1]) if c not in set(columns)]
+    before = sum(c < at for c in others)
+    place = {c: k + (len(numbers) if k >= before else 0) for k, c in enumerate(others)}
     start, stop = (
         np.column_stack(
-            [array[:, kept[:before]], *(pair[k] for pair in numbers), array[:, kept[before:]]]
+            [
+                array[:, others[:before]],
+                *(pair[k] for pair in numbers),
+                array[:, others[before:]],
+            ]
         )
         for k, array in enumerate((rows.start, rows.stop))
     )
@@ -173,7 +177,7 @@ def split_text(
         patterns=tuple(patterns),
         notes=notes if notes.cut(0, rows.n_rows) else None,
         ending=None if rows.ending is None else last_carry + rows.ending,
-    ), found
+    ), text_columns
 
 
 def _merge_columns(

@@ -102,7 +102,7 @@ def rate_of_times(
 ) -> tuple[Fraction | None, bool]:
     """The rate of times that are whole frames apart, to half a unit of their last digit.
 
-    Frames are counted by ``numbers``, those of the frames in the file, else by rows, else, where
+    Frames are counted by ``numbers``, those of the frames in the file, else by rows, else, if
     rows are missing that nothing counts, by the steps between the times, most of which are one
     frame. ``half_digits`` are tried in order. Returns None if no count fits; and whether the
     rate is a round or a stated one.
@@ -112,14 +112,14 @@ def rate_of_times(
     counts = [np.arange(len(times)), *([numbers - numbers[0]] if numbers is not None else [])]
     counts = [count for count in reversed(counts) if count[-1] > 0]
     noise = 8 * float(np.spacing(np.abs(times).max()))
-    given = [(count, list(stated)) for count in counts]
+    stated_rates = [(count, list(stated)) for count in counts]
     near = [(count, _round(_mean_rate(times, count))) for count in counts]
     run = _longest_run(times)
     of_run = _round(_mean_rate(run, np.arange(len(run)))) if len(run) > 1 else []
     for k, half_digit in enumerate(half_digits):
         digits = _Digits(2 * half_digit, noise)
         rates = chain(
-            _counted_rates(times, given, digits, 1.0),
+            _counted_rates(times, stated_rates, digits, 1.0),
             _stepped_rates(
                 times, stated, digits, 0.99
             ),  # all of a digit: halfway between two frames
@@ -218,7 +218,7 @@ def frame_rate(frame_time: str) -> tuple[Fraction | None, bool]:
     """Frames a second, and whether that is exactly the reciprocal of the seconds printed.
 
     A rate whose reciprocal rounds to the printed digits is taken for the true one, if it is an
-    integer, or an integer divided by 1.001, or, where at least 6 more digits are printed than
+    integer, or an integer divided by 1.001, or, if at least 6 more digits are printed than
     would tell such rates apart, one of at most 3 decimals; in this order. Otherwise it is the
     reciprocal itself. None if the frame time is zero, negative, absurd or not a number.
     """
@@ -252,7 +252,7 @@ SECOND = Fraction(1)
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """``signals``: one of times where there are some that no clock gives, named ``time``.
+    """``signals``: one of times if there are some that no clock gives, named ``time``.
 
     ``rate`` is None if times are not whole frames apart. ``exact``: it is round or stated.
     ``note`` says why the signal has not the role of times. ``printed`` are the times of a clock.
@@ -267,7 +267,7 @@ class Times:
 
 
 def as_times(signal: Signal, channel: Channel) -> tuple[Signal, str]:
-    """A signal of one channel as the times, and why it has not their role, "" where it has."""
+    """A signal of one channel as the times, and why it has not their role, "" if it has."""
     fault = times_fault(signal.masked()[:, 0])
     role = "" if fault else TIMES
     named = replace(signal, name="time", channels=(channel,), role=role)

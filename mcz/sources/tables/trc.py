@@ -55,7 +55,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     separator = b"\t" if b"\t" in data[header.rows :].partition(b"\n")[0] else None
     table = read_table(data, header.rows, time + 1, columns, separator)
     rows = without_zeros(data, counted_up(table.rows), ([time], range(time)))
-    motion = read_columns(data, rows, range(time))
+    markers = read_columns(data, rows, range(time))
     joints = tuple(Joint(marker, channels=POSITION) for marker in names)
     unit_cm = UNIT_CM.get(header.values.get("units", "").lower())
     skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="")
@@ -63,9 +63,9 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     text = _mark_header(data, header, rows.n_rows, names[: len(labels)])
     signals = range(1 + len(times.signals))
     section = section_of(text, (table.missing, times.clock), rows, names, signals)
-    found = Motion(
+    motion = Motion(
         skeleton,
-        (motion, *times.signals),
+        (markers, *times.signals),
         times.rate,
         times.exact,
         name,
@@ -73,7 +73,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
         table_source("trc", data, [(section, rows, 1)]),
         rows.numbers,
     )
-    return found if times.printed is None else found.at_times(times.printed)
+    return motion if times.printed is None else motion.at_times(times.printed)
 
 
 def _header(data: bytes) -> _Header:

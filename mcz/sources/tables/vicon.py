@@ -2,7 +2,7 @@
 
 SPEC.md, "The text of tables", is normative for the way back. The trajectories, else the objects are
 the motion, every marker and object a joint without a parent; the other sections are signals, of
-several rows a frame where the file has sub frames.
+several rows a frame if the file has sub frames.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class _Read:
 def read_vicon(data: bytes, name: str = "motion") -> Motion:
     """The motion in a CSV file of Vicon; ``name`` becomes its name; the up axis is unknown.
 
-    Raises SourceError, with the number of the line, also where sections differ in their frames.
+    Raises SourceError, with the number of the line, also if sections differ in their frames.
     """
     encoding = text_encoding(data)
     parts = _parts(data, encoding)
@@ -172,8 +172,8 @@ def _part(
             groups.append((name or f"column {k + 1}", []))
         groups[-1][1].append((axis_name, units[k] if k < len(units) else ""))
     texts = [texts_of(data[slice(*place)], separator, encoding) for place in (title, rate)]
-    said, stated = ((text[0] if text else "") for text in texts)
-    return _Part(start, rows, stop, separator, said or "section", stated, labels, groups)
+    name, stated = ((text[0] if text else "") for text in texts)
+    return _Part(start, rows, stop, separator, name or "section", stated, labels, groups)
 
 
 def _read(data: bytes, part: _Part) -> _Read:
@@ -210,14 +210,14 @@ def _without(part: _Part, texts: Sequence[int]) -> _Part:
     labels = []
     at = 0
     for name, columns in part.groups:
-        kept = []
+        rest = []
         for axis, unit in columns:
             if at in texts:
                 labels.append(f"{name}.{axis}")
             else:
-                kept.append((axis, unit))
+                rest.append((axis, unit))
             at += 1
-        groups += [(name, kept)] if kept else []
+        groups += [(name, rest)] if rest else []
     labels += ["Sub Frame"] if at in texts else []
     return replace(part, groups=groups, texts=tuple(labels))
 
@@ -297,13 +297,13 @@ def _joints(part: _Part) -> tuple[Joint, ...]:
 
 
 def _unit_cm(part: _Part) -> float | None:
-    """The unit of the positions in cm, None where there are none, or of several units."""
+    """The unit of the positions in cm, None if there are none, or of several units."""
     units = _units(part, "t")
     return UNIT_CM.get(units.pop()) if len(units) == 1 else None
 
 
 def _angle_unit(part: _Part) -> str:
-    """The unit of the rotation vectors, "" where there are none, or of several units."""
+    """The unit of the rotation vectors, "" if there are none, or of several units."""
     units = _units(part, "v")
     return (units & {"rad", "deg"}).pop() if len(units) == 1 and units & {"rad", "deg"} else ""
 

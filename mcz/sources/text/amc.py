@@ -49,7 +49,7 @@ DERIVED = "the channels of the AMC differ from those of its ASF"
 def read(data: bytes, name: str = "motion", skeleton: Skeleton | None = None) -> Motion:
     """The motion in an AMC file; ``name`` becomes its name; the frame rate is unknown.
 
-    Where the bones do not fit ``skeleton``, the motion's skeleton is derived from it, with ``base``
+    If the bones do not fit ``skeleton``, the motion's skeleton is derived from it, with ``base``
     b"", to be replaced with the id of ``skeleton``; the metadata say so. Raises
     SourceError, with the number of the line.
     """
@@ -152,7 +152,7 @@ class _Frames:
 def bones(data: bytes, *, whole: bool = False) -> dict[str, int]:
     """The bones of the first frame, or of the ``whole`` file: how many values each has.
 
-    Nothing where there is no frame.
+    Nothing if there is no frame.
     """
     match = _FIRST_FRAME.search(data)
     if match is None:

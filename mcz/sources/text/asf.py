@@ -16,9 +16,9 @@ from mcz.sources.text.source import MOST_JOINTS, check, check_first_line, check_
 
 
 def read(data: bytes, name: str = "skeleton") -> Skeleton:
-    """The skeleton in an ASF file; ``name`` is its name where the file gives none.
+    """The skeleton in an ASF file; ``name`` is its name if the file gives none.
 
-    Joint 0 is the root. Raises SourceError, with the number of the line where there is one.
+    Joint 0 is the root. Raises SourceError, with the number of the line if there is one.
     """
     check_text(data)
     check_first_line(data, (b"#", b":version"))
@@ -33,7 +33,7 @@ def _read(data: bytes, name: str) -> Skeleton:
 
 
 def write(skeleton: Skeleton) -> bytes:
-    """The ASF file of ``skeleton``: its own source where that still describes it, or a plain one.
+    """The ASF file of ``skeleton``: its own source if that still describes it, or a plain one.
 
     Raises MotionError for what ASF cannot say. The length unit is kept only if it is CMU's.
     """
@@ -112,7 +112,7 @@ def _polar(vector: Vector) -> tuple[Vector, float]:
 
 
 def _check_joints(skeleton: Skeleton) -> tuple[Joint, ...]:
-    """The joints; MotionError where ASF cannot hold them."""
+    """The joints; MotionError if ASF cannot hold them."""
     joints = skeleton.joints
     if not joints or joints[0].name != "root" or joints[0].tails or skeleton.intrinsic:
         raise MotionError("ASF needs a first joint 'root' without tails, and fixed rotation axes")
@@ -252,10 +252,10 @@ def _order(words: list[str]) -> str:
 
 
 def read_text(text: str, name: str) -> Skeleton:
-    """The skeleton, without its source; ``name`` is its name where the file gives none.
+    """The skeleton, without its source; ``name`` is its name if the file gives none.
 
     Joint 0 is the root. A bone becomes a joint at its parent's tail, with its own vector, in the
-    file's length unit, as its tail. Raises SourceError, with the number of the line where it can.
+    file's length unit, as its tail. Raises SourceError, with the number of the line if it can.
     """
     reader = _Reader()
     for number, line in enumerate(_LINE_END.split(text), 1):
@@ -282,7 +282,7 @@ def _is_inch_unit(length: str) -> bool:
 
 
 def _joints(reader: _Reader) -> tuple[Joint, ...]:
-    """The root, then the bones in definition order, moved back only where a parent comes later."""
+    """The root, then the bones in definition order, moved back only if a parent comes later."""
     for parent, child in reader.links:
         bone = reader.bones.get(child)
         if bone is None or (parent != "root" and parent not in reader.bones):

@@ -52,7 +52,7 @@ def flat(counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]
 
 
 def fit(skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]:
-    """``skeleton``, or one derived from it where its channels are not those of the bones."""
+    """``skeleton``, or one derived from it if its channels are not those of the bones."""
     names = match_names(skeleton, counts)
     channels: dict[str | None, int] = {j.name: len(j.channels) for j in skeleton.joints}
     fits = all(channels.get(names[bone]) == count for bone, count in counts.items())
@@ -71,8 +71,8 @@ def match_names(skeleton: Skeleton, bones: Mapping[str, int]) -> dict[str, str |
     matched: set[str | None] = {*(joints & bones.keys())}
     result: dict[str, str | None] = {}
     for bone in bones:
-        alike = [name for name in folded.get(bone.casefold(), []) if name not in matched]
-        result[bone] = bone if bone in joints else alike[0] if len(alike) == 1 else None
+        candidates = [name for name in folded.get(bone.casefold(), []) if name not in matched]
+        result[bone] = bone if bone in joints else candidates[0] if len(candidates) == 1 else None
         matched.add(result[bone])
     return result
 
@@ -82,15 +82,15 @@ def derive(skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str = "") 
 
     A joint whose number of values differs has rx ry rz if there are 3, else plain scalars; a root
     joint always has plain scalars then. Bones without a joint become root joints of plain scalars.
-    The axes are converted where the AMC has another ``angle_unit``.
+    The axes are converted if the AMC has another ``angle_unit``.
     """
     names = match_names(skeleton, counts)
-    wanted = {names[bone]: count for bone, count in counts.items()}
+    counts_by_name = {names[bone]: count for bone, count in counts.items()}
     angle_unit = angle_unit or skeleton.angle_unit
     convert = degrees if angle_unit == "deg" else radians
     joints = []
     for joint in skeleton.joints:
-        count = wanted.get(joint.name, len(joint.channels))
+        count = counts_by_name.get(joint.name, len(joint.channels))
         if count != len(joint.channels):
             turns = count == 3 and joint.parent >= 0
             kinds = tuple(Channel(kind) for kind in ROTATION_KINDS)

@@ -166,7 +166,7 @@ def with_positions(joints: Sequence[Joint], values: Values) -> tuple[Joint, ...]
     """The joints, with what their position channels do to the offset.
 
     BVH does not say it, and programs differ, so the values decide: positions replace the offset
-    where they lie nearer to it than to zero. A root goes by its first frame, all other joints
+    if they lie nearer to it than to zero. A root goes by its first frame, all other joints
     together by the majority of them, each by all frames. Ties, such as a zero offset, mean "add".
     """
     decided = list(joints)

@@ -137,7 +137,7 @@ class _Reader:
         return number
 
     def _known_channels(self) -> list[Channel]:
-        """The channels where all are known and as many as are counted, and no word follows."""
+        """The channels if all are known and as many as are counted, and no word follows."""
         match = _KNOWN_CHANNELS.match(self.data, self.at)
         names = match[2].split() if match else []
         if match is None or len(names) != int(match[1]):
@@ -158,7 +158,7 @@ class _Reader:
         self._refuse_another(int(count))
 
     def _refuse_another(self, count: int) -> None:
-        """Raise SourceError where another channel follows."""
+        """Raise SourceError if another channel follows."""
         after = self.at
         if channel(self.word().decode("latin-1")).kind:
             raise self.error(f"CHANNELS {count}, but more channels are named")

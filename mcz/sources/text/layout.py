@@ -297,7 +297,7 @@ class RowNotes:
     texts: tuple[tuple[int, bytes], ...] = ()
 
     def cut(self, start: int, stop: int) -> bytes:
-        """NOTES of rows start <= r < stop; b"" where all of them are usual."""
+        """NOTES of rows start <= r < stop; b"" if all of them are usual."""
         patterns = self.patterns[start:stop]
         low, high = bisect_left(self.texts, (start,)), bisect_left(self.texts, (stop,))
         texts = [(row - start, text) for row, text in self.texts[low:high]]
@@ -352,16 +352,16 @@ def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
 
 def checked_runs(runs: Sequence[PatternRun], n_rows: int, where: str) -> list[tuple[int, int, int]]:
     """(start, stop, pattern) of PATTERN_RUNs of ``n_rows`` rows; raises FormatError."""
-    found, row = [], 0
+    checked, row = [], 0
     for run in runs:
         # AMC-01, AMC-02
         if run.n_rows < 1 or run.n_rows > n_rows - row or run.pattern >= MAX_PATTERNS:
             raise FormatError(
                 f"pattern {run.pattern} for {run.n_rows} rows from {row} on", where=where
             )
-        found.append((row, row + run.n_rows, run.pattern))
+        checked.append((row, row + run.n_rows, run.pattern))
         row += run.n_rows
-    return found
+    return checked
 
 
 def checked_texts(texts: Sequence[NumberText], n_rows: int, where: str) -> list[tuple[int, bytes]]:

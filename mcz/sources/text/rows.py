@@ -77,7 +77,7 @@ class Rows:
 def counted_up(rows: Rows, n_each: int = 1) -> Rows:
     """``rows``, ``n_each`` a frame, with numbers that ascend from frame to frame.
 
-    Where those of the file do not, they count from the first by 1, and the notes have its texts.
+    If those of the file do not, they count from the first by 1, and the notes have its texts.
     """
     numbers = rows.numbers
     if numbers is None or (np.diff(numbers[::n_each]) > 0).all():
@@ -105,8 +105,8 @@ def read_rows(
     ``cells``: what a token is, as ``text_kernels.match_rows`` has it. ``room``: how many cells
     there may be for each byte of ``data``, which bounds the memory.
 
-    Raises SourceError if ``frames`` does, where the layout is too irregular to be worth
-    a template, and where rows name so few columns that the table would dwarf the file.
+    Raises SourceError if ``frames`` does, if the layout is too irregular to be worth
+    a template, and if rows name so few columns that the table would dwarf the file.
     """
     widths = widths or {}
     for look_at in LOOK_FOR_PADDING:
@@ -150,8 +150,8 @@ class _Reader:
         text = np.frombuffer(self.data, np.uint8)
         begin, last_end = at, at
         self._allocate(min(64, self._most_rows()))
-        while (found := self.frames(at)) is not None:
-            tokens, end = found
+        while (frame := self.frames(at)) is not None:
+            tokens, end = frame
             if self.row + 1 >= len(self.numbers):
                 self._grow(at - begin, len(self.data) - begin)
             last_end = self._learn(at, tokens, end)

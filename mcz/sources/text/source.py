@@ -28,7 +28,7 @@ LOOKED_AT = 64  # bytes in which every other one of UTF-16 is zero
 
 
 def text_encoding(data: bytes) -> str:
-    """ "utf-8" where all of ``data`` is, otherwise "latin-1", which every byte string is."""
+    """ "utf-8" if all of ``data`` is, otherwise "latin-1", which every byte string is."""
     if data.isascii():
         return "utf-8"
     try:
@@ -62,7 +62,7 @@ def check_text(data: bytes) -> None:
 
 
 def check_first_line(data: bytes, ignored: tuple[bytes, ...]) -> None:
-    """Raise SourceError where a byte order mark hides a line that means something.
+    """Raise SourceError if a byte order mark hides a line that means something.
 
     ``ignored``: how lines begin that do not. In an ASF or AMC the mark belongs to the first word,
     for every reader, as the skeleton of a file is compared with what its ASF describes.
@@ -93,21 +93,21 @@ MOST_DEPTH = 4096
 
 
 def check(what: str, number: int, most: int) -> None:
-    """Raise SourceError where a skeleton has more than it may have of ``what``."""
+    """Raise SourceError if a skeleton has more than it may have of ``what``."""
     if number > most:
         raise SourceError(f"more than {most:,} {what}, the limit of a stored skeleton")
 
 
 Floats = NDArray[np.float64]
-Frame = tuple[int | None, Floats]  # its number, None where the text has none, and (n_channels,)
+Frame = tuple[int | None, Floats]  # its number, None if the text has none, and (n_channels,)
 
 
 @dataclass(frozen=True, slots=True)
 class Arriving:
     """The header of a motion, read up to its first frame, and all of its frames in order.
 
-    Values are NaN where the text has none. ``declared`` is how many frames the header says there
-    are, None where it says nothing that is a number. ``frames`` raises SourceError, with the number
+    Values are NaN if the text has none. ``declared`` is how many frames the header says there
+    are, None if it says nothing that is a number. ``frames`` raises SourceError, with the number
     of the line, at text that is none of the format.
     """
 

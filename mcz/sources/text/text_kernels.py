@@ -152,8 +152,8 @@ def match_rows(
     """Match as many rows of one pattern as possible from offset ``at`` and row ``row`` on.
 
     ``cells``: what a token is. One of ``WORDS`` ends at a blank. Those of tables end at separators
-    and quotes, too: none is empty if ``FULL``, all but the first may be where ``BLANKS``, and
-    all where ``FREE``. One of ``MARKUP`` ends at a blank, quote or tag, and is not empty. Fills
+    and quotes, too: none is empty if ``FULL``, all but the first may be if ``BLANKS``, and
+    all if ``FREE``. One of ``MARKUP`` ends at a blank, quote or tag, and is not empty. Fills
     ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,). Returns the row and the
     offset of the first row that does not match, or for which there is no room.
     """

@@ -33,7 +33,7 @@ class SceneFile:
 
     ``key_error`` is the bound that was kept, ``max_error`` the greatest distance of a joint or an
     end of a bone (or a marker) from its place in the motion, over all frames; it is met in
-    ``frame`` by ``point``. Both are in mm; in length units of the motion where ``has_unit`` is
+    ``frame`` by ``point``. Both are in mm; in length units of the motion if ``has_unit`` is
     False. ``n_keys`` keys are left of ``n_values``, one a frame and channel. ``notes`` list
     assumptions and omissions.
     """
@@ -112,14 +112,14 @@ def to_glb(
 ) -> SceneFile:
     """``motion`` as binary glTF 2.0: an animated skeleton with solid bones, or markers.
 
-    Keys are left out where interpolation keeps every joint, end of a bone and marker within
+    Keys are left out if interpolation keeps every joint, end of a bone and marker within
     ``key_error_mm`` in every frame, by default 0.1 mm; if the length unit is unknown, within
     1/20,000 of the figure's size. 0: a key in every frame. ``rate``, ``unit`` ("cm", "m", ...) and
     ``up`` ("x" to "-z") replace the motion's own; if the last two are unknown, a unit becomes a
     meter and y points up, and ``notes`` mention it.
 
-    Raises OptionError where the frame rate is unknown, and where float32 numbers cannot keep the
-    bound; MotionError where the skeleton has no kinematics, or lacks a joint in some frame.
+    Raises OptionError if the frame rate is unknown, and if float32 numbers cannot keep the
+    bound; MotionError if the skeleton has no kinematics, or lacks a joint in some frame.
     """
     return to_scene(motion, "glb", key_error_mm=key_error_mm, rate=rate, unit=unit, up=up)
 

@@ -109,17 +109,17 @@ class _Document:
             top["rotation"] = UP_TURNS[scene.up_axis]
         nodes = [top]
         for node, below in zip(scene.nodes, scene.children, strict=True):
-            made: JsonObject = {"name": node.name}
+            entry: JsonObject = {"name": node.name}
             rest = _floats(node.rest)
             if any(rest):
-                made["translation"] = rest
+                entry["translation"] = rest
             if below:
-                made["children"] = [number + 1 for number in below]
+                entry["children"] = [number + 1 for number in below]
             if scene.is_markers:
-                made["mesh"] = self.sides.index(node.side)
+                entry["mesh"] = self.sides.index(node.side)
                 if not node.is_visible.any():
-                    made["scale"] = [0.0, 0.0, 0.0]
-            nodes.append(made)
+                    entry["scale"] = [0.0, 0.0, 0.0]
+            nodes.append(entry)
         if not scene.is_markers:
             nodes.append({"name": "bones", "mesh": 0, "skin": 0})
         return nodes
@@ -218,15 +218,15 @@ class _Document:
     ) -> int:
         """Add rows of numbers to the last buffer view, which is number ``view``."""
         start = self.views[view]["byteOffset"]
-        made = {"bufferView": view, "byteOffset": len(self.buffer) - start, "componentType": code}
-        made |= {"count": len(data), "type": TYPES[data.shape[1]], **more}
-        if not made["byteOffset"]:
-            del made["byteOffset"]
+        entry = {"bufferView": view, "byteOffset": len(self.buffer) - start, "componentType": code}
+        entry |= {"count": len(data), "type": TYPES[data.shape[1]], **more}
+        if not entry["byteOffset"]:
+            del entry["byteOffset"]
         if bounds:
-            made |= {"min": _floats(data.min(axis=0)), "max": _floats(data.max(axis=0))}
+            entry |= {"min": _floats(data.min(axis=0)), "max": _floats(data.max(axis=0))}
         self.buffer += data.tobytes()
         self.views[view]["byteLength"] = len(self.buffer) - start
-        self.accessors.append(made)
+        self.accessors.append(entry)
         return len(self.accessors) - 1
 
 

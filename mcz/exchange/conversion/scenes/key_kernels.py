@@ -75,7 +75,7 @@ def _fits(
 
 
 def _angle(one: Floats, other: Floats, width: int) -> float:
-    """Angle between quaternions, 0 where linear interpolation suffices; -1 beyond 90 degrees."""
+    """Angle between quaternions, 0 if linear interpolation suffices; -1 beyond 90 degrees."""
     if width == 3:
         return 0.0
     dot, square = 0.0, 0.0

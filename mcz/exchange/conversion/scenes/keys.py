@@ -66,7 +66,7 @@ class SceneKeys:
 def find_keys(scene: Scene, bound: float) -> SceneKeys:
     """The keys of ``scene`` that keep every node within ``bound``; 0: a key in every frame.
 
-    Raises OptionError where float32 numbers alone exceed it.
+    Raises OptionError if float32 numbers alone exceed it.
     """
     return _KeySearch(scene, bound).run()
 

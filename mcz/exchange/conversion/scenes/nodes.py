@@ -325,8 +325,8 @@ def solid_of(scene: Scene) -> Solid:
         triangles[scene.nodes[start].side].append(OCTAHEDRON + 6 * len(corners))
         corners.append(shape)
         nodes += [start] * 5 + [end]
-    made = {side: np.concatenate(parts) for side, parts in triangles.items() if parts}
-    return Solid(np.concatenate(corners), np.array(nodes, np.int64), made)
+    by_side = {side: np.concatenate(parts) for side, parts in triangles.items() if parts}
+    return Solid(np.concatenate(corners), np.array(nodes, np.int64), by_side)
 
 
 def _bones(scene: Scene) -> Iterator[tuple[Floats, int, int]]:

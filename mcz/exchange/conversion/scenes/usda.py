@@ -210,11 +210,11 @@ def identifiers(names: Sequence[str]) -> list[str]:
     for name in names:
         stem = IDENTIFIER.sub("_", name)
         stem = f"_{stem}" if not stem or stem[0].isdigit() else stem
-        made, number = stem, numbers.get(stem, 1)
-        while made in unique:
+        identifier, number = stem, numbers.get(stem, 1)
+        while identifier in unique:
             number += 1
-            made = f"{stem}_{number}"
-        unique[made] = None
+            identifier = f"{stem}_{number}"
+        unique[identifier] = None
         numbers[stem] = number
     return list(unique)
 
@@ -225,8 +225,8 @@ def quote_text(text: str) -> str:
     >>> print(quote_text('a "b" \\ \n'))
     "a \"b\" \\ \x0a"
     """
-    made = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + re.sub(r"[\x00-\x1f\x7f]", lambda match: f"\\x{ord(match[0]):02x}", made) + '"'
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + re.sub(r"[\x00-\x1f\x7f]", lambda match: f"\\x{ord(match[0]):02x}", escaped) + '"'
 
 
 def _samples(
