@@ -57,7 +57,7 @@ the frame rate. A value that is missing is NaN.
 """
 
 
-class Recording(NamedTuple):
+class BidsRecording(NamedTuple):
     """The place of a clip in a data set: ``stem`` has all entities."""
 
     subject: str
@@ -80,17 +80,17 @@ class _Column(NamedTuple):
     units: str
 
 
-def recording_of(motion: Motion) -> Recording:
+def recording_of(motion: Motion) -> BidsRecording:
     """The place of a clip: that of its name if BIDS made it, else one of subject and name."""
     named = _NAME.fullmatch(PurePosixPath(motion.name).name)
     if named is not None:
         subject, session, task = named[1], named[3] or "", named[4]
-        return Recording(subject, session, task, named[0].removesuffix("_motion"))
+        return BidsRecording(subject, session, task, named[0].removesuffix("_motion"))
     subject = _label(motion.metadata.get("subject", "")) or UNKNOWN
     task = _label(motion.name) or UNKNOWN
     is_inertial = motion.source is not None and motion.source.format == "mvnx"
     system = "imu" if is_inertial else "omc"  # optical
-    return Recording(subject, "", task, f"sub-{subject}_task-{task}_tracksys-{system}")
+    return BidsRecording(subject, "", task, f"sub-{subject}_task-{task}_tracksys-{system}")
 
 
 def clip_files(motion: Motion) -> dict[str, bytes]:

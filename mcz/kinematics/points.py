@@ -314,10 +314,8 @@ def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
     return markers.at_times(motion.timeline)
 
 
-def marker_skeleton(
-    skeleton: Skeleton, base: bytes | None = None, *, virtual_markers: bool = False
-) -> Skeleton:
-    """A marker for each point of ``skeleton``, whose id is ``base``, then its virtual markers."""
+def marker_skeleton(skeleton: Skeleton, *, virtual_markers: bool = False) -> Skeleton:
+    """A marker for each point of ``skeleton``, then its virtual markers."""
     names = list(point_names(skeleton))
     if virtual_markers:
         names += virtual_marker_names(skeleton)
@@ -330,7 +328,6 @@ def marker_skeleton(
         skeleton.up_axis,
         skeleton.forward_axis,
         skeleton.handedness,
-        base=base,
     )
 
 

@@ -111,15 +111,15 @@ def vectors_of_quaternions(quaternions: Floats) -> Floats:
     return parts * np.where(w < 0, -ratio, ratio)
 
 
-def continuous(vectors: Floats, start: Floats | None = None) -> Floats:
+def continuous(vectors: Floats) -> Floats:
     """The same rotations by vectors each near the one before, (3, F).
 
-    v and v (1 + 2 pi n / |v|) turn alike. The first is the one nearest to ``start``, (3,), or the
-    shortest; each other is the one nearest to the vector before. If v is 0, the axis of the
+    v and v (1 + 2 pi n / |v|) turn alike. The first is the shortest; each other is the
+    one nearest to the vector before. If v is 0, the axis of the
     vector before is used. Vectors that are not finite are skipped.
     """
     out = np.array(vectors, np.float64)
-    last: Any = np.zeros(3) if start is None else np.asarray(start, np.float64)
+    last: Any = np.zeros(3)
     for frame in np.flatnonzero(np.isfinite(out).all(axis=0)).tolist():
         out[:, frame] = last = nearest_vector(out[:, frame], last)
     return out

@@ -274,7 +274,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
     first = columns.n_motion + sum(signal.n_channels for signal in more)
     labels = [name[1:] for name in columns.attributes if columns.column(name) in texts]
     more += read_text(data, rows, list(texts.values()), labels, (first, 1))
-    times = _times(data, rows, header, columns, texts)
+    times = _times(data, rows, header, columns)
     if not _ENDED.match(rest):
         is_cut = b"<frame" in rest
         odd.append("cut off in a frame, which is kept as text" if is_cut else "no end of 'frames'")
@@ -369,13 +369,7 @@ def _split_text(
     return rows, dict(zip(chosen, texts, strict=True))
 
 
-def _times(
-    data: bytes,
-    rows: Rows,
-    header: Header,
-    columns: FrameColumns,
-    texts: Mapping[int, TextColumn],
-) -> Times:
+def _times(data: bytes, rows: Rows, header: Header, columns: FrameColumns) -> Times:
     """The times of the frames in milliseconds, and the rate, which the header states."""
     rate = stated_rate(header.subject.get("frameRate", ""))
     stated = [] if rate is None else [rate]

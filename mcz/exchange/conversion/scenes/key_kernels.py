@@ -25,21 +25,21 @@ def choose(times: Floats, exact: Floats2, rounded: Floats2, limits: Floats, kept
     (n_frames,) are the greatest distances of interpolated values from their targets.
     """
     n = len(exact)
-    scratch, interpolated = np.empty(4), np.empty(4)
+    interpolated = np.empty(4)
     kept[:] = 0
     kept[0] = 1
     first = 0
     while first < n - 1:
         low, step = first + 1, 2
         while first + step < n and _fits(
-            times, exact, rounded, limits, first, first + step, scratch, interpolated
+            times, exact, rounded, limits, first, first + step, interpolated
         ):
             low = first + step
             step *= 2
         high = min(first + step, n)
         while high - low > 1:
             middle = (low + high) // 2
-            if _fits(times, exact, rounded, limits, first, middle, scratch, interpolated):
+            if _fits(times, exact, rounded, limits, first, middle, interpolated):
                 low = middle
             else:
                 high = middle
@@ -54,7 +54,6 @@ def _fits(
     limits: Floats,
     first: int,
     last: int,
-    scratch: Floats,
     interpolated: Floats,
 ) -> bool:
     """Return True if all frames between two keys of one hemisphere are near enough."""

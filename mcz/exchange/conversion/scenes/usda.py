@@ -123,7 +123,7 @@ def _skeleton(scene: Scene, keys: SceneKeys, name: str) -> Iterator[str]:
     yield "}"
     if moving:
         yield from _animation(scene, keys, [paths[k] for k in moving], moving)
-    yield from _mesh(scene, solid_of(scene), name)
+    yield from _mesh(solid_of(scene), name)
 
 
 def _animation(
@@ -163,7 +163,7 @@ def _row(tracks: Sequence[NDArray[np.float32]], frame: int, order: list[int]) ->
     return f"[{', '.join(_tuple(t[min(frame, len(t) - 1)][order]) for t in tracks)}]"
 
 
-def _mesh(scene: Scene, solid: Solid, name: str) -> Iterator[str]:
+def _mesh(solid: Solid, name: str) -> Iterator[str]:
     triangles = np.concatenate([solid.triangles[s] for s in SIDES if s in solid.triangles])
     colors = [COLORS[side] for side in SIDES for _ in solid.triangles.get(side, ())]
     yield 'def Mesh "bones" ('
