@@ -78,7 +78,7 @@ RUNS = ("LeftFoot", 5, 40), ("RightFoot", 30, 60), ("LeftFoot", 50, 3), ("LeftFo
 @pytest.mark.parametrize("unit", ["deg", "rad"])
 def test_feet_keep_their_places(step: float, unit: str) -> None:
     motion = walk_motion(angle_unit=unit)
-    coded = Direct("posewave", motion, step=step, contacts=RUNS)
+    coded = Direct("posewave", motion, step=step, contacts=RUNS, contact_tolerance=TOLERANCE)
     decoded = coded.read()
     assert errors_cm(motion, decoded, RUNS).max() <= TOLERANCE
     without = Direct("posewave", motion, step=step)
@@ -92,6 +92,15 @@ def test_feet_keep_their_places(step: float, unit: str) -> None:
     assert off.mean() < usual.mean() and off.max() < 1.5 * usual.max()
     # Coarser requests know nothing of contacts.
     assert np.array_equal(coded.read(resolution=1), without.read(resolution=1))
+
+
+@pytest.mark.parametrize(("step", "tolerance"), [(0.005, 0.01), (0.02, 0.02), (0.3, 0.05)])
+def test_the_tolerance_follows_the_step(step: float, tolerance: float) -> None:
+    motion = walk_motion()
+    coded = Direct("posewave", motion, step=step, contacts=RUNS)
+    stated = Direct("posewave", motion, step=step, contacts=RUNS, contact_tolerance=tolerance)
+    assert np.array_equal(coded.read(), stated.read())
+    assert errors_cm(motion, coded.read(), RUNS).max() <= tolerance
 
 
 @settings(max_examples=12)
@@ -111,7 +120,7 @@ def test_whatever_runs(seed: int, step: float, tolerance: float) -> None:
 def test_contacts_go_on_across_segments() -> None:
     motion = walk_motion(400)
     runs = ("LeftFoot", 5, 300), ("RightFoot", 120, 250)
-    coded = Direct("posewave", motion, step=0.2, contacts=runs, segment_frames=64)
+    coded = Direct("posewave", motion, step=0.2, contacts=runs, contact_tolerance=TOLERANCE, segment_frames=64)
     assert len(coded.segments) == 7
     decoded = coded.read()
     assert errors_cm(motion, decoded, runs).max() <= TOLERANCE
@@ -122,7 +131,7 @@ def test_two_points_of_a_foot() -> None:
     """The toe's second contact begins and ends within one of its foot, the first does not."""
     motion = walk_motion()
     runs = ("LeftFoot", 5, 60), ("LeftToe", 40, 60), ("LeftToe", 110, 30), ("LeftFoot", 80, 10)
-    coded = Direct("posewave", motion, step=0.2, contacts=runs)
+    coded = Direct("posewave", motion, step=0.2, contacts=runs, contact_tolerance=TOLERANCE)
     assert errors_cm(motion, coded.read(), runs).max() <= TOLERANCE
 
 
@@ -130,7 +139,7 @@ def test_two_points_of_a_foot() -> None:
 @pytest.mark.parametrize("name", ["16_02", "05_01"])
 def test_real_clips(name: str, data: Path) -> None:
     motion = amc(data, name)
-    coded = Direct("posewave", motion, step=0.1, contacts="auto")
+    coded = Direct("posewave", motion, step=0.1, contacts="auto", contact_tolerance=TOLERANCE)
     runs = runs_of(MemorySource(motion, 0, coded.codec, 2**26), "auto")
     assert [run[:3] for run in runs] == [
         (run.joint, run.first, run.n_frames) for run in mcz.contacts(motion).runs

@@ -81,6 +81,7 @@ USUAL = (  # steps, mean errors
 )
 MEAN_TO_BOUND = 0.2  # the mean error with which a bound takes few bytes and trials
 STEP_OF_BOUND = 0.2  # live, where rows of frames that are farther off get finer ones
+CONTACT_TOLERANCES_CM = 0.01, 0.05  # between which it is the step
 COARSEST_WEIGHT = 0.096  # of a bit at level 0, whose errors affect later rows
 
 
@@ -129,12 +130,12 @@ def choose(source: SignalSource, params: Params) -> Choice:
     if fields["levels"] is None:
         fields["levels"], frame_bytes = best_levels(source, skeleton, fields, weights, step_cm)
     fields["borrowing"] = min(1, fields["levels"])
-    fields["contacts"], tracker = _contacts(source, params, step / step_cm)
+    fields["contacts"], tracker = _contacts(source, params, step, step / step_cm)
     return Choice(build_header(**fields), weights, tracker, frame_bytes)
 
 
 def _contacts(
-    source: SignalSource, params: Params, in_cm: float
+    source: SignalSource, params: Params, step: float, in_cm: float
 ) -> tuple[list[ContactsFields], ContactTracker | None]:
     """Choose the contacts and their tracker; ``in_cm``: length units per centimeter."""
     if not params.get("contacts") or not source.layout.n_frames:
@@ -148,7 +149,8 @@ def _contacts(
             "tolerance is in cm",
             hint=Hint.UNIT,
         )
-    tolerance = params["contact_tolerance"] * in_cm
+    asked, (least, most) = params["contact_tolerance"], CONTACT_TOLERANCES_CM
+    tolerance = min(max(step, least * in_cm), most * in_cm) if asked is None else asked * in_cm
     runs = runs_of(source, params["contacts"])
     chosen = choose_contacts(skeleton, runs, tolerance, None if rate is None else float(rate))
     return ([chosen.fields], ContactTracker(tolerance, chosen.pieces)) if chosen else ([], None)

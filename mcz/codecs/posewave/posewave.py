@@ -389,8 +389,9 @@ CODEC = Codec(
         ),
         Parameter(
             "contact_tolerance",
-            0.01,
-            "cm that the displacement of a joint within a contact may be off",
+            None,
+            "cm that the displacement of a standing joint may be off; default: the step, 0.01 to "
+            "0.05",
             number("contact_tolerance", 1e-6, 1e6),
         ),
         Parameter(
