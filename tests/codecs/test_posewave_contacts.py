@@ -120,7 +120,9 @@ def test_whatever_runs(seed: int, step: float, tolerance: float) -> None:
 def test_contacts_go_on_across_segments() -> None:
     motion = walk_motion(400)
     runs = ("LeftFoot", 5, 300), ("RightFoot", 120, 250)
-    coded = Direct("posewave", motion, step=0.2, contacts=runs, contact_tolerance=TOLERANCE, segment_frames=64)
+    coded = Direct(
+        "posewave", motion, step=0.2, contacts=runs, contact_tolerance=TOLERANCE, segment_frames=64
+    )
     assert len(coded.segments) == 7
     decoded = coded.read()
     assert errors_cm(motion, decoded, runs).max() <= TOLERANCE
