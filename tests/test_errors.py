@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.cli.hints import OPTION_HINTS
+from mcz.cli.common import OPTION_HINTS
 from mcz.errors import Fields, FormatError, MczError, SourceError, error_context
 from mcz.hints import PYTHON_HINTS, Hint, Remark, worded
 

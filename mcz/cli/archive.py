@@ -11,28 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.archive_summary import print_file_results
-from mcz.cli.common import Exit, Failure, errors_about, require_file
-from mcz.cli.hints import add_salvage_hint
-from mcz.cli.options import (
-    check_force_rate,
-    clips_option,
-    copies_option,
-    decoded_option,
-    encoding_options,
-    force_option,
-    force_rate_option,
-    jobs_option,
-    json_option,
-    key_error_option,
-    rate_option,
-    salvage_option,
-    skeleton_option,
-    threads_option,
-    unit_option,
-    where_option,
-)
+from mcz.cli.common import Exit, Failure, add_salvage_hint, errors_about, require_file
 from mcz.cli.outputs import TARGETS, resolve_output
+from mcz.cli.shared_options import check_force_rate
 from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
@@ -42,9 +25,9 @@ if TYPE_CHECKING:
 @click.command(short_help="Pack a folder of motion files into one .mcz.")
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @click.argument("target", metavar="OUT.mcz", type=click.Path(readable=False))
-@encoding_options
-@rate_option()
-@force_rate_option
+@shared_options.encoding
+@shared_options.rate()
+@shared_options.force_rate
 @click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
 @click.option(
     "--scheduler",
@@ -56,11 +39,11 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Keep the modification time of each file; unpack --mtimes restores it.",
 )
-@copies_option("yes")
-@force_option
-@threads_option
-@jobs_option
-@json_option
+@shared_options.copies("yes")
+@shared_options.force
+@shared_options.threads
+@shared_options.jobs
+@shared_options.json
 def pack_command(
     folder: str,
     target: str,
@@ -119,7 +102,7 @@ def _packing(scheduler: str | None) -> Callable[..., Report]:
     "sources", metavar="SRC...", nargs=-1, required=True, type=click.Path(readable=False)
 )
 @click.argument("target", metavar="FILE.mcz", type=click.Path(readable=False))
-@skeleton_option("Use this ASF for the AMCs, or none.")
+@shared_options.skeleton("Use this ASF for the AMCs, or none.")
 @click.option(
     "--root",
     metavar="DIR",
@@ -148,13 +131,13 @@ def _packing(scheduler: str | None) -> Callable[..., Report]:
     help="Skip clips of an .mcz that FILE.mcz already has, identical and under the same name.",
 )
 @click.option("--replace", is_flag=True, help="Replace a file of the same path; rewrites FILE.mcz.")
-@copies_option("yes if the file has copies")
-@encoding_options
-@rate_option()
-@force_rate_option
-@threads_option
-@jobs_option
-@json_option
+@shared_options.copies("yes if the file has copies")
+@shared_options.encoding
+@shared_options.rate()
+@shared_options.force_rate
+@shared_options.threads
+@shared_options.jobs
+@shared_options.json
 def append_command(
     sources: tuple[str, ...],
     target: str,
@@ -210,9 +193,9 @@ def append_command(
 @click.command(short_help="Restore every source file of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
-@clips_option
-@where_option
-@salvage_option
+@shared_options.clips
+@shared_options.where
+@shared_options.salvage
 @click.option(
     "--names",
     type=click.Choice(("stored", "portable", "strict")),
@@ -224,11 +207,11 @@ def append_command(
 @click.option(
     "--mtimes", is_flag=True, help="Restore the modification times that pack --mtimes kept."
 )
-@decoded_option
-@force_option
-@threads_option
-@jobs_option
-@json_option
+@shared_options.max_decoded
+@shared_options.force
+@shared_options.threads
+@shared_options.jobs
+@shared_options.json
 def unpack_command(
     file: str,
     folder: str,
@@ -276,16 +259,16 @@ def unpack_command(
     required=True,
     help="Set the format; bids makes a data set of Motion-BIDS.",
 )
-@clips_option
-@where_option
-@rate_option()
-@unit_option("clips that state none")
-@key_error_option
-@decoded_option
-@force_option
-@threads_option
-@jobs_option
-@json_option
+@shared_options.clips
+@shared_options.where
+@shared_options.rate()
+@shared_options.unit("clips that state none")
+@shared_options.key_error
+@shared_options.max_decoded
+@shared_options.force
+@shared_options.threads
+@shared_options.jobs
+@shared_options.json
 def export_command(
     file: str,
     folder: str,

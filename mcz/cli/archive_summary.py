@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
-from mcz.cli.common import Exit, echo, plural, print_json, say
-from mcz.cli.hints import in_options
+from mcz.cli.common import Exit, in_options
+from mcz.cli.terminal import echo, plural, print_json, say
 from mcz.files.reading.fidelity import GIVEN_BACK
 
 if TYPE_CHECKING:

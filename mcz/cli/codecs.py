@@ -13,22 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.common import (
     Exit,
     Failure,
     check_new,
-    echo,
     errors_about,
-    plural,
-    print_json,
+    in_options,
     require_file,
-    say,
-    table,
     write_output,
 )
-from mcz.cli.hints import in_options
-from mcz.cli.options import force_option, json_option, unit_option
-from mcz.cli.terminal import Progress
+from mcz.cli.terminal import Progress, echo, plural, print_json, say, table
 from mcz.errors import reason_of
 from mcz.model.types import JsonObject
 
@@ -43,7 +38,7 @@ WIDEST = 44  # characters of a line of the meaning
 
 @click.command(short_help="List codecs and their parameters.")
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@json_option
+@shared_options.json
 def codecs_command(names: tuple[str, ...], as_json: bool) -> Exit:
     """List the codecs, or the parameters of each NAME: default, range and meaning.
 
@@ -164,9 +159,9 @@ AXES = "xyz"
 @click.option(
     "--every", metavar="N", type=click.IntRange(1), default=1, help="Use only every N-th frame."
 )
-@unit_option("files that state none")
-@force_option
-@json_option
+@shared_options.unit("files that state none")
+@shared_options.force
+@shared_options.json
 def train_command(
     clips: tuple[str, ...],
     output: Path,
@@ -239,7 +234,7 @@ PAPERS = "python -m tools.papers"
 @click.option("--tables", "paper", hidden=True)  # an internal option of tools/papers
 @click.option("--peers", is_flag=True, help="Add the general compressors that are installed.")
 @click.option("--speeds/--no-speeds", default=True, help="Also measure speed and memory (default).")
-@unit_option("files that state none")
+@shared_options.unit("files that state none")
 @click.option(
     "--out",
     metavar="DIR",
@@ -253,7 +248,7 @@ PAPERS = "python -m tools.papers"
     help="Use N processes. Default: one per processor.",
 )
 @click.option("--cache/--no-cache", default=True, help="Reuse earlier results (default).")
-@json_option
+@shared_options.json
 def bench_command(
     clips: tuple[str, ...],
     codecs: str | None,

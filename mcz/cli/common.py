@@ -1,41 +1,36 @@
-"""Exit codes, one-line errors, files and argument types of all commands."""
+"""Exit codes, one-line errors with hints, and files of all commands."""
 
 from __future__ import annotations
 
 import os
-import re
 import signal
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
-from fractions import Fraction
 from pathlib import Path
 from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.hints import OPTION_HINTS, add_salvage_hint
-from mcz.cli.terminal import binary_output as binary_output
-from mcz.cli.terminal import echo as echo
-from mcz.cli.terminal import print_json as print_json
-from mcz.cli.terminal import printable as printable
-from mcz.cli.terminal import say as say
-from mcz.cli.terminal import say_json
-from mcz.cli.terminal import text_output as text_output
+from mcz.cli.terminal import say, say_json
 from mcz.errors import (
     AccessError,
     ContactWarning,
     Fields,
+    FormatError,
+    LimitError,
     MczError,
     OptionError,
     SkeletonWarning,
+    UnsupportedError,
     reason_of,
 )
-from mcz.hints import Hint
-from mcz.model.types import JsonObject
+from mcz.hints import PYTHON_HINTS, Hint, Words, worded
+from mcz.model.text_format import counted
+from mcz.model.types import JsonObject, Params
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -89,7 +84,6 @@ class JsonRefused(Failure):
     """A command without JSON output, also of this error."""
 
 
-WIDEST_CELL = 48  # characters that the columns of a table are aligned to
 OUT_OF_MEMORY = "out of memory: the process may not use as much as this needs"
 
 
@@ -332,81 +326,75 @@ def write_output(path: Path, data: bytes, force: bool) -> None:
         stream.write(data)
 
 
-def plural(count: int, word: str) -> str:
-    """
-    >>> plural(1, "clip"), plural(2400, "frame")
-    ('1 clip', '2,400 frames')
-    """
-    return f"{count:,} {word}" if count == 1 else f"{count:,} {word}s"
+OPTION_HINTS: Words = {
+    Hint.BLENDER: PYTHON_HINTS[Hint.BLENDER],
+    Hint.CONVERT: "choose a format with --to",
+    Hint.ENCODE: "encode a source file with mcz encode",
+    Hint.FEET: "name the joints of feet (--feet)",
+    Hint.FILM: "make it shorter (--speed, --fps, --frames)",
+    Hint.FORCE: "use --force to replace it",
+    Hint.FORCE_RATE: "--force-rate overrides it",
+    Hint.FRAMES: "write only some of the frames (--frames)",
+    Hint.JOBS: "--jobs 1 needs less memory",
+    Hint.KEEP_ALL: "--keep-all keeps it",
+    Hint.KEY_ERROR: "allow a larger error (--key-error)",
+    Hint.LARGE: "--profile large allows more",
+    Hint.MAX_DECODED: "raise it with --max-decoded",
+    Hint.NAME_CODEC: "--codec re-encodes it",
+    Hint.OLD_FORMAT: PYTHON_HINTS[Hint.OLD_FORMAT],
+    Hint.PAGE: "select clips (--clip), choose --codec lossy, or allow more bytes (--max-size)",
+    Hint.PORTABLE_NAMES: "--names portable writes both",
+    Hint.RATE: "set the frame rate (--rate)",
+    Hint.RECODE: "--recode re-encodes them",
+    Hint.RECODE_LOSSY: "--recode re-encodes them, which adds a small error",
+    Hint.REPLACE: "replace it with mcz append --replace",
+    Hint.SALVAGE: "--salvage reads them, mcz repair writes them to a valid file",
+    Hint.SERIES: "choose channels by name (--channel)",
+    Hint.SKELETON: "choose one with --skeleton, or 'none'",
+    Hint.UNIT: "set the unit (--unit)",
+    Hint.UP: "set the up axis (--up)",
+    Hint.VERBATIM: "--verbatim keeps the file as an attachment",
+}
 
 
-def table(rows: Sequence[Sequence[str]], right: str = "") -> list[str]:
-    """Rows as lines of aligned columns, the first a heading; an "r" in ``right`` aligns right.
-
-    A cell of more than ``WIDEST_CELL`` characters shifts only the rest of its own row.
-
-    >>> table([["name", "n"], ["walk", "240"]], "lr")
-    ['name    n', 'walk  240']
-    """
-    rows = [[printable(cell) for cell in row] for row in rows]
-    widths = [
-        max((len(cell) for cell in column if len(cell) <= WIDEST_CELL), default=0)
-        for column in zip(*rows, strict=True)
-    ]
-    sides = right.ljust(len(widths), "l")
-    return [
-        "  ".join(
-            cell.rjust(width) if side == "r" else cell.ljust(width)
-            for cell, width, side in zip(row, widths, sides, strict=True)
-        ).rstrip()
-        for row in rows
-    ]
+def in_options(text: str) -> str:
+    """``text`` with its hint, if it has one, in words of the command line."""
+    return worded(text, OPTION_HINTS)
 
 
-def to_frames(
-    ctx: click.Context, param: click.Parameter, value: str | None
-) -> tuple[int, int | None] | None:
-    """Parse ``A:B``: frames A <= f < B counted from 0; either end may be left out."""
-    if value is None:
+@contextmanager
+def add_salvage_hint(target: str | bytes, options: Params) -> Iterator[None]:
+    """Add the intact parts of a damaged file, and the hint to salvage them, to its error."""
+    try:
+        yield
+    except (UnsupportedError, LimitError):
+        raise
+    except FormatError as error:
+        from mcz.files.reading.file import is_source
+
+        whole = None if options.get("salvage") else _intact_counts(target)
+        if whole is not None:
+            error.add(note=whole, hint=Hint.SALVAGE)
+        elif isinstance(target, str) and is_source(target):
+            error.add(hint=Hint.ENCODE)
+        raise
+
+
+def _intact_counts(target: str | bytes) -> str | None:
+    """Counts of the intact parts of a damaged local file; None if there are none."""
+    import mcz
+
+    if isinstance(target, str) and "://" in target:
+        return None  # all of it would have to be read
+    try:
+        with mcz.open(target, salvage=True) as file:
+            rows = file.container.directory.clips.values()
+            clips = sum(row.cend is not None and not row.damage for row in rows)
+            damaged, attachments = len(rows) - clips, len(file.attachments)
+    except MczError:
         return None
-    start, colon, stop = value.partition(":")
-    digits = all(re.fullmatch("[0-9]{1,16}", part) for part in (start, stop) if part)
-    if not colon or not digits or (start and stop and int(start) > int(stop)):
-        raise click.BadParameter(f"{value!r} is not a range A:B of frames with A <= B")
-    return int(start or 0), int(stop) if stop else None
-
-
-def to_rate(ctx: click.Context, param: click.Parameter, value: str | None) -> Fraction | None:
-    """Parse a rate: frames a second as ``120``, ``29.97`` or ``30000/1001``."""
-    if value is None:
+    counts = ((clips, "whole clip"), (damaged, "damaged clip"), (attachments, "attachment"))
+    parts = [counted(count, what) for count, what in counts if count]
+    if not parts:
         return None
-    rate = Fraction(0)
-    if re.fullmatch(r"[0-9]{1,15}(\.[0-9]{1,15}|/0*[1-9][0-9]{0,14})?", value):
-        rate = Fraction(value)
-    if rate <= 0:
-        raise click.BadParameter(f"{value!r} is not a rate such as 120, 29.97 or 30000/1001")
-    return rate
-
-
-def to_params(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> JsonObject:
-    """Parse ``KEY=VALUE``; numbers and truths are converted."""
-    pairs = {}
-    for value in values:
-        key, equals, text = value.partition("=")
-        if not equals or not key:
-            raise click.BadParameter(f"{value!r} is not KEY=VALUE")
-        pairs[key] = literal(text)
-    return pairs
-
-
-def literal(text: str) -> Any:
-    """
-    >>> literal("3"), literal("4.4"), literal("true"), literal("bior4.4")
-    (3, 4.4, True, 'bior4.4')
-    """
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return {"true": True, "false": False}.get(text, text)
+    return f"it holds {', '.join(parts)}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.clip_outputs import (
     ConversionSummary,
     clip_outputs,
@@ -14,7 +15,7 @@ from mcz.cli.clip_outputs import (
     summary_facts,
     summary_lines,
 )
-from mcz.cli.common import Exit, Failure, JsonRefused, plural, report_damage, say
+from mcz.cli.common import Exit, Failure, JsonRefused, report_damage
 from mcz.cli.decode_options import (
     SOURCE_GIVEN,
     DecodeOptions,
@@ -22,23 +23,6 @@ from mcz.cli.decode_options import (
     check_options,
     check_signal,
     refuse,
-)
-from mcz.cli.options import (
-    ITS_RATE_HELP,
-    arrays_option,
-    decoded_option,
-    force_option,
-    frames_option,
-    json_option,
-    key_error_option,
-    model_option,
-    rate_option,
-    salvage_option,
-    skeleton_option,
-    threads_option,
-    unit_option,
-    up_option,
-    where_option,
 )
 from mcz.cli.outputs import (
     TARGETS,
@@ -50,6 +34,8 @@ from mcz.cli.outputs import (
     target_of_clip,
     write_outputs,
 )
+from mcz.cli.shared_options import ITS_RATE_HELP
+from mcz.cli.terminal import plural, say
 from mcz.files.reading.fidelity import RESTORED
 from mcz.model.types import JsonObject, Settings
 
@@ -74,8 +60,8 @@ if TYPE_CHECKING:
     multiple=True,
     help="Choose a clip (repeatable). Required if there are several.",
 )
-@where_option
-@frames_option("Use only frames A <= f < B, counted from 0.")
+@shared_options.where
+@shared_options.frames("Use only frames A <= f < B, counted from 0.")
 @click.option(
     "--joints", metavar="a,b", help="Write only these joints, by name or index (with --to)."
 )
@@ -120,10 +106,10 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Write stored words instead of values in units (with --signal).",
 )
-@up_option("Set the up axis of a clip that states none (with --to c3d, glb or usda).")
-@unit_option("a clip that states none (with --to another format)")
-@key_error_option
-@rate_option("Set the frame rate, replacing the clip's own (with --to, --post-filter).")
+@shared_options.up("Set the up axis of a clip that states none (with --to c3d, glb or usda).")
+@shared_options.unit("a clip that states none (with --to another format)")
+@shared_options.key_error
+@shared_options.rate("Set the frame rate, replacing the clip's own (with --to, --post-filter).")
 @click.option(
     "--solve-ik",
     "solve",
@@ -131,14 +117,14 @@ if TYPE_CHECKING:
     help="Fit the skeleton of a clip of positions to its points (--to amc, bvh, glb or usda).",
 )
 @click.option("--with-skeleton", is_flag=True, help="Also write the skeleton's own file (ASF).")
-@salvage_option
+@shared_options.salvage
 @click.option(
     "--unverified", is_flag=True, help="Read fewer bytes, but do not check their checksums."
 )
-@decoded_option
-@force_option
-@threads_option
-@json_option
+@shared_options.max_decoded
+@shared_options.force
+@shared_options.threads
+@shared_options.json
 def decode_command(
     file: str,
     output: str | None,
@@ -261,23 +247,25 @@ OF_SOURCES = ("skeleton", "arrays", "model")
     help="Set the format. Default: by the suffix of OUT.",
 )
 @click.option("--clip", "names", metavar="NAME", multiple=True, help="Choose the clip of an .mcz.")
-@where_option
-@frames_option("Use only frames A <= f < B, counted from 0.")
+@shared_options.where
+@shared_options.frames("Use only frames A <= f < B, counted from 0.")
 @click.option(
     "--joints", metavar="a,b", help="Write only these joints, by name or index (to csv or npz)."
 )
-@skeleton_option("Use this ASF for an AMC, or none. Default: the one beside it, as in mcz encode.")
-@rate_option(ITS_RATE_HELP)
-@unit_option("a file that states none")
-@up_option("Set the up axis of a file that states none.")
-@arrays_option
-@model_option
-@key_error_option
+@shared_options.skeleton(
+    "Use this ASF for an AMC, or none. Default: the one beside it, as in mcz encode."
+)
+@shared_options.rate(ITS_RATE_HELP)
+@shared_options.unit("a file that states none")
+@shared_options.up("Set the up axis of a file that states none.")
+@shared_options.arrays
+@shared_options.model
+@shared_options.key_error
 @click.option("--with-skeleton", is_flag=True, help="Also write the skeleton's own file (ASF).")
-@decoded_option
-@force_option
-@threads_option
-@json_option
+@shared_options.max_decoded
+@shared_options.force
+@shared_options.threads
+@shared_options.json
 def convert_command(
     file: str,
     output: str,

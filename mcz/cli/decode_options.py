@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.cli.common import Exit, Failure, errors_about, open_input, require_file, say
-from mcz.cli.hints import in_options
+from mcz.cli.common import Exit, Failure, errors_about, in_options, open_input, require_file
 from mcz.cli.outputs import CONVERSIONS, SCENES
+from mcz.cli.terminal import say
 from mcz.files.reading.fidelity import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
 from mcz.model.types import Params, Values
 

@@ -11,32 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
-    echo,
     errors_about,
+    in_options,
     open_input,
-    plural,
-    print_json,
     require_file,
-    table,
 )
 from mcz.cli.figures import figure_lines
-from mcz.cli.hints import in_options
-from mcz.cli.options import (
-    arrays_option,
-    decoded_option,
-    frames_option,
-    json_option,
-    model_option,
-    rate_option,
-    skeleton_option,
-    unit_option,
-    up_option,
-    where_option,
-)
+from mcz.cli.terminal import echo, plural, print_json, table
 from mcz.model.text_format import first_of
 from mcz.model.types import JsonObject, Params
 
@@ -69,14 +55,14 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     multiple=True,
     help="Choose a clip of an .mcz (repeatable). Default: the only one, or all that both have.",
 )
-@where_option
-@frames_option("Use only frames A <= f < B of both, counted from 0.")
-@unit_option("a file that states none")
-@skeleton_option("Use this ASF for an AMC, or none.")
-@rate_option()
-@up_option("Set the up axis of a file that states none.")
-@arrays_option
-@model_option
+@shared_options.where
+@shared_options.frames("Use only frames A <= f < B of both, counted from 0.")
+@shared_options.unit("a file that states none")
+@shared_options.skeleton("Use this ASF for an AMC, or none.")
+@shared_options.rate()
+@shared_options.up("Set the up axis of a file that states none.")
+@shared_options.arrays
+@shared_options.model
 @click.option(
     "--shell",
     "shell_cm",
@@ -94,8 +80,8 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     callback=_to_names,
     help="Name the joints that stand on the floor. Default: those called foot, toe, ankle or heel.",
 )
-@decoded_option
-@json_option
+@shared_options.max_decoded
+@shared_options.json
 def diff_command(
     a: str,
     b: str,

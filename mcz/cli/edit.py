@@ -14,31 +14,17 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.cli import shared_options
 from mcz.cli.common import (
     Exit,
     Failure,
-    echo,
+    add_salvage_hint,
     errors_about,
-    plural,
-    print_json,
-    printable,
     report_damage,
     require_file,
-    say,
-)
-from mcz.cli.hints import add_salvage_hint
-from mcz.cli.options import (
-    clips_option,
-    copies_option,
-    decoded_option,
-    force_option,
-    frames_option,
-    json_option,
-    salvage_option,
-    where_option,
 )
 from mcz.cli.outputs import resolve_output
-from mcz.cli.terminal import Progress
+from mcz.cli.terminal import Progress, echo, plural, print_json, printable, say
 from mcz.model.text_format import cell_text
 
 if TYPE_CHECKING:
@@ -59,20 +45,20 @@ if TYPE_CHECKING:
 @click.option(
     "--joints", metavar="a,b", help="Keep the channels of these joints, by name or index."
 )
-@frames_option("Keep frames A <= f < B, counted from 0.")
+@shared_options.frames("Keep frames A <= f < B, counted from 0.")
 @click.option(
     "--recode",
     is_flag=True,
     help="Re-encode if joints are coded together, or if other frames would stay stored; adds a "
     "small error if lossy. Default: refuse such joints.",
 )
-@clips_option
-@where_option
-@salvage_option
-@copies_option("yes if IN.mcz has copies")
-@decoded_option
-@force_option
-@json_option
+@shared_options.clips
+@shared_options.where
+@shared_options.salvage
+@shared_options.copies("yes if IN.mcz has copies")
+@shared_options.max_decoded
+@shared_options.force
+@shared_options.json
 def extract_command(
     file: str,
     output: str,
@@ -171,9 +157,9 @@ def _parts(clip: ExtractedClip) -> Iterator[str]:
     help="Re-encode a clip whose joints are coded together; other joints change a little. Default: "
     "refuse such a clip.",
 )
-@copies_option("yes if IN.mcz has copies")
-@force_option
-@json_option
+@shared_options.copies("yes if IN.mcz has copies")
+@shared_options.force
+@shared_options.json
 def replace_command(
     file: str,
     output: str | None,

@@ -10,33 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.common import (
     Exit,
     Failure,
     JsonRefused,
-    binary_output,
-    echo,
     errors_about,
+    in_options,
     open_input,
-    plural,
-    print_json,
     require_file,
-    say,
 )
 from mcz.cli.figures import error_summary
-from mcz.cli.hints import in_options
-from mcz.cli.options import (
-    ITS_RATE_HELP,
-    copies_option,
-    encoding_options,
-    force_option,
-    json_option,
-    rate_option,
-    skeleton_option,
-    threads_option,
-)
 from mcz.cli.outputs import resolve_output
-from mcz.cli.terminal import Progress
+from mcz.cli.shared_options import ITS_RATE_HELP
+from mcz.cli.terminal import Progress, binary_output, echo, plural, print_json, say
 
 if TYPE_CHECKING:
     from mcz.files.writing.file import Written
@@ -53,7 +40,7 @@ INPUT_FORMATS = "bvh amc c3d asf trc mot sto csv mvnx npy npz pickle torch".spli
     metavar="OUT.mcz",
     help="Write to a file, a folder, or - for standard output. Default: SRC with the suffix .mcz.",
 )
-@skeleton_option(
+@shared_options.skeleton(
     "Use this ASF for an AMC, or none. Default: an ASF beside the AMC or in a sibling folder asf/ "
     "with the name of the take or the subject, or the only one whose bones fit."
 )
@@ -64,12 +51,12 @@ INPUT_FORMATS = "bvh amc c3d asf trc mot sto csv mvnx npy npz pickle torch".spli
     help="Set the format of standard input. Default: detect it from the content; for live input "
     "BVH, or AMC with --skeleton.",
 )
-@copies_option("no")
-@encoding_options
-@rate_option(ITS_RATE_HELP)
-@force_option
-@threads_option
-@json_option
+@shared_options.copies("no")
+@shared_options.encoding
+@shared_options.rate(ITS_RATE_HELP)
+@shared_options.force
+@shared_options.threads
+@shared_options.json
 def encode_command(
     source: str,
     more: tuple[str, ...],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from mcz.cli.common import plural, printable, table
+from mcz.cli.terminal import plural, printable, table
 from mcz.model.types import Params
 
 SETTING = "param."

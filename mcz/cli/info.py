@@ -9,23 +9,20 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.common import (
     EXIT_CODES,
+    OPTION_HINTS,
     Exit,
     Failure,
-    echo,
     errors_about,
+    in_options,
     open_input,
-    plural,
-    print_json,
     report_damage,
     require_file,
     run,
-    say,
-    table,
 )
 from mcz.cli.figures import figure_lines
-from mcz.cli.hints import OPTION_HINTS, in_options
 from mcz.cli.info_lines import (
     array_lines,
     preview_lines,
@@ -36,16 +33,7 @@ from mcz.cli.info_lines import (
     time_lines,
 )
 from mcz.cli.lazy import StrictCommand
-from mcz.cli.options import (
-    clips_option,
-    decoded_option,
-    json_option,
-    salvage_option,
-    skeleton_option,
-    version_option,
-    where_option,
-)
-from mcz.cli.terminal import is_terminal
+from mcz.cli.terminal import echo, is_terminal, plural, print_json, say, table
 from mcz.cli.verify import is_malformed
 from mcz.errors import FormatError, MczError
 from mcz.model.text_format import first_of
@@ -69,7 +57,7 @@ RATIOS = (  # of the bytes that a codec wrote, which alone restore no source
     cls=StrictCommand, short_help="Show the contents and sizes of a file.", epilog=EXIT_CODES
 )
 @click.argument("file", metavar="FILE", type=click.Path(readable=False))
-@json_option
+@shared_options.json
 @click.option(
     "--layout", "show_layout", is_flag=True, help="Print the meaning of every byte range."
 )
@@ -79,17 +67,17 @@ RATIOS = (  # of the bytes that a codec wrote, which alone restore no source
     is_flag=True,
     help="Check everything; print the offset and the SPEC.md heading of each fault.",
 )
-@clips_option
-@where_option
-@salvage_option
-@skeleton_option("Use this ASF for an AMC.")
+@shared_options.clips
+@shared_options.where
+@shared_options.salvage
+@shared_options.skeleton("Use this ASF for an AMC.")
 @click.option(
     "--preview/--no-preview",
     default=None,
     help="Draw motion over time as a line and bytes of joints as bars. Default: on a terminal, for "
     "clips that decode quickly.",
 )
-@decoded_option
+@shared_options.max_decoded
 def info_command(
     file: str,
     as_json: bool,
@@ -363,7 +351,7 @@ def _notes(clips: list[JsonObject]) -> Iterator[str]:
 
 
 def main() -> None:
-    sys.exit(run(version_option(info_command), "mcz-info"))
+    sys.exit(run(shared_options.version(info_command), "mcz-info"))
 
 
 if __name__ == "__main__":

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mcz.cli.common import plural, table
-from mcz.cli.terminal import can_show
+from mcz.cli.terminal import can_show, plural, table
 from mcz.errors import MczError
 from mcz.model.motion import Motion
 from mcz.model.types import Floats, JsonObject, Reals

@@ -9,18 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import (
-    Exit,
-    JsonRefused,
-    echo,
-    errors_about,
-    open_input,
-    plural,
-    print_json,
-    report_damage,
-    table,
-)
-from mcz.cli.options import json_option, salvage_option, where_option
+from mcz.cli import shared_options
+from mcz.cli.common import Exit, JsonRefused, errors_about, open_input, report_damage
+from mcz.cli.terminal import echo, plural, print_json, table
 from mcz.model.text_format import spreadsheet_cell
 from mcz.model.types import JsonObject
 
@@ -35,7 +26,7 @@ HEADS = {"name": "clip", "n_frames": "frames", "n_channels": "channels", "frame_
 
 @click.command(short_help="List clips, from the index alone.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
-@where_option
+@shared_options.where
 @click.option(
     "--columns",
     metavar="a,b",
@@ -44,8 +35,8 @@ HEADS = {"name": "clip", "n_frames": "frames", "n_channels": "channels", "frame_
 )
 @click.option("--sort", metavar="KEY", help="Sort by a field or metadata key; -KEY: descending.")
 @click.option("--csv", "as_csv", is_flag=True, help="Print only the clips, as a CSV table.")
-@salvage_option
-@json_option
+@shared_options.salvage
+@shared_options.json
 def list_command(
     file: str,
     where: str | None,

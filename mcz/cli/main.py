@@ -16,21 +16,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import (
-    EXIT_CODES,
-    Exit,
-    Failure,
-    echo,
-    errors_about,
-    exists_error,
-    plural,
-    print_json,
-    run,
-    table,
-    write_output,
-)
+from mcz.cli import shared_options
+from mcz.cli.common import EXIT_CODES, Exit, Failure, errors_about, exists_error, run, write_output
 from mcz.cli.lazy import lazy_group
-from mcz.cli.options import force_option, json_option, version_option
+from mcz.cli.terminal import echo, plural, print_json, table
 from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
@@ -81,7 +70,7 @@ COMMANDS = {  # name: module and function
     "Every command has its own --help. Nothing is overwritten without --force.",
     epilog=EXIT_CODES,
 )
-@version_option
+@shared_options.version
 def cli() -> None:
     pass
 
@@ -115,8 +104,8 @@ def completion_command(shell: str) -> Exit:
 
 @click.command(short_help="Write a generated walk (ASF/AMC, BVH and C3D).")
 @click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-@force_option
-@json_option
+@shared_options.force
+@shared_options.json
 def sample_command(folder: Path, force: bool, as_json: bool) -> Exit:
     """Write walk.asf, walk.amc, walk.bvh and walk.c3d into DIR: two seconds of walking at 120 Hz.
 
@@ -147,7 +136,7 @@ CLIP = "walk"
 
 
 @click.command(short_help="Test this installation in a few seconds.")
-@json_option
+@shared_options.json
 def selftest_command(as_json: bool) -> Exit:
     """Show what is installed, and encode, decode and verify a generated walk with each codec.
 

@@ -9,20 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import (
-    Exit,
-    Failure,
-    echo,
-    errors_about,
-    open_input,
-    plural,
-    print_json,
-    require_file,
-    say,
-    to_rate,
-)
-from mcz.cli.options import clips_option, json_option, where_option
-from mcz.cli.terminal import Progress
+from mcz.cli import shared_options
+from mcz.cli.common import Exit, Failure, errors_about, open_input, require_file
+from mcz.cli.shared_options import to_rate
+from mcz.cli.terminal import Progress, echo, plural, print_json, say
 
 if TYPE_CHECKING:
     from mcz.files.editing.metadata_edit import Entries
@@ -53,8 +43,8 @@ def _to_pairs(
 
 @click.command(short_help="Show and edit clip metadata.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
-@clips_option
-@where_option
+@shared_options.clips
+@shared_options.where
 @click.option(
     "--file", "of_file", is_flag=True, help="Edit the metadata of the file, not of clips."
 )
@@ -96,7 +86,7 @@ def _to_pairs(
     help="Print a record for a repository, as JSON; required properties that the file does not "
     "state are named on standard error."
 )  # fmt: skip
-@json_option
+@shared_options.json
 def meta_command(
     file: str,
     clips: tuple[str, ...],

@@ -8,17 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path, PurePath, PurePosixPath
 from typing import TYPE_CHECKING, NamedTuple
 
-from mcz.cli.common import (
-    Exit,
-    Failure,
-    binary_output,
-    check_new,
-    echo,
-    errors_about,
-    print_json,
-    text_output,
-    write_output,
-)
+from mcz.cli.common import Exit, Failure, check_new, errors_about, write_output
+from mcz.cli.terminal import binary_output, echo, print_json, text_output
 from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -11,65 +11,38 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
     check_new,
-    echo,
     errors_about,
+    in_options,
     open_input,
-    plural,
-    print_json,
     require_file,
-    say,
-    table,
-)
-from mcz.cli.hints import in_options
-from mcz.cli.options import (
-    arrays_option,
-    decoded_option,
-    force_option,
-    frames_option,
-    json_option,
-    model_option,
-    rate_option,
-    skeleton_option,
-    unit_option,
-    up_option,
 )
 from mcz.cli.outputs import resolve_output
-from mcz.cli.terminal import Progress
+from mcz.cli.terminal import Progress, echo, plural, print_json, say, table
 
 if TYPE_CHECKING:
     from mcz.files.reading.clip import Clip
     from mcz.model.motion import Motion
 
 
-Function = Callable[..., object]
-
-
-def motion_options(function: Function) -> Function:
-    """``--clip --frames --rate --unit --up --skeleton --arrays --model --max-decoded``."""
-    options = (
-        click.option(
-            "--clip",
-            "name",
-            metavar="NAME",
-            help="Choose the clip of an .mcz. Default: the only one.",
-        ),
-        frames_option("Use only frames A <= f < B, counted from 0."),
-        rate_option(),
-        unit_option("a file that states none"),
-        up_option("Set the up axis of a file that states none."),
-        skeleton_option("Use this ASF for an AMC, or none."),
-        arrays_option,
-        model_option,
-        decoded_option,
-    )
-    for option in reversed(options):
-        function = option(function)
-    return function
+motion_options = shared_options.combine(
+    click.option(
+        "--clip", "name", metavar="NAME", help="Choose the clip of an .mcz. Default: the only one."
+    ),
+    shared_options.frames("Use only frames A <= f < B, counted from 0."),
+    shared_options.rate(),
+    shared_options.unit("a file that states none"),
+    shared_options.up("Set the up axis of a file that states none."),
+    shared_options.skeleton("Use this ASF for an AMC, or none."),
+    shared_options.arrays,
+    shared_options.model,
+    shared_options.max_decoded,
+)
 
 
 @contextmanager
@@ -152,8 +125,8 @@ def to_size(
     default=None,
     help="Move the camera along. Default: if the figure would be small otherwise.",
 )
-@force_option
-@json_option
+@shared_options.force
+@shared_options.json
 def render_command(
     file: str,
     output: str | None,
@@ -257,8 +230,8 @@ MOST_ROWS = 24  # of a table that is printed
 @click.option(
     "--theme", type=click.Choice(("light", "dark")), default="light", help="Set the colors."
 )
-@force_option
-@json_option
+@shared_options.force
+@shared_options.json
 def plot_command(
     file: str,
     other: str | None,

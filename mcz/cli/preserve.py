@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import Exit, Failure, echo, errors_about, plural, print_json, require_file, say
-from mcz.cli.options import decoded_option, force_option, json_option
+from mcz.cli import shared_options
+from mcz.cli.common import Exit, Failure, errors_about, require_file
 from mcz.cli.outputs import resolve_output
-from mcz.cli.terminal import Progress
+from mcz.cli.terminal import Progress, echo, plural, print_json, say
 
 if TYPE_CHECKING:
     from mcz.files.editing.recovering import Recovery
@@ -47,7 +47,7 @@ def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
     is_flag=True,
     help="Report whether the file is intact or can be repaired; change nothing.",
 )
-@json_option
+@shared_options.json
 def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool) -> Exit:
     """Append recovery data to FILE.mcz, with which mcz repair can restore every byte.
 
@@ -117,9 +117,9 @@ def _print_protection(file: str, recovery: Recovery) -> None:
 @click.command(short_help="Write the intact parts of a damaged .mcz to a valid one.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.option("-o", "--output", metavar="OUT.mcz", required=True, help="Write to this file.")
-@decoded_option
-@force_option
-@json_option
+@shared_options.max_decoded
+@shared_options.force
+@shared_options.json
 def repair_command(
     file: str, output: str, max_decoded: int | None, force: bool, as_json: bool
 ) -> Exit:
@@ -177,7 +177,7 @@ def _repair_lines(output: str, result: Repair) -> Iterator[str]:
     multiple=True,
     help="Add a line to bag-info.txt, such as Source-Organization=TEXT (repeatable).",
 )
-@json_option
+@shared_options.json
 def bag_command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_json: bool) -> Exit:
     """Copy the files into DIR, a new folder, as a bag (BagIt).
 

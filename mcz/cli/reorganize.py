@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.archive_summary import print_clip_results
 from mcz.cli.common import Exit, Failure, errors_about, require_file
-from mcz.cli.options import force_option, json_option, output_option, where_option
 from mcz.cli.terminal import Progress
 
 
 @click.command(short_help="Delete clips from an .mcz, and all their bytes.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@where_option
+@shared_options.where
 @click.option(
     "--aliases", is_flag=True, help="Also delete aliases of the same content. Default: refuse."
 )
-@output_option
-@force_option
-@json_option
+@shared_options.output
+@shared_options.force
+@shared_options.json
 def delete_command(
     file: str,
     names: tuple[str, ...],
@@ -49,9 +49,9 @@ def delete_command(
 @click.command(short_help="Rename clips of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("names", metavar="OLD NEW...", nargs=-1, required=True)
-@output_option
-@force_option
-@json_option
+@shared_options.output
+@shared_options.force
+@shared_options.json
 def rename_command(
     file: str, names: tuple[str, ...], output: str | None, force: bool, as_json: bool
 ) -> Exit:
@@ -79,9 +79,9 @@ def rename_command(
     metavar="KEY",
     help="Sort by a field or metadata key, -KEY: descending; take2 comes before take10.",
 )
-@output_option
-@force_option
-@json_option
+@shared_options.output
+@shared_options.force
+@shared_options.json
 def reorder_command(
     file: str,
     names: tuple[str, ...],
@@ -121,8 +121,8 @@ def reorder_command(
     metavar="NAME",
     help="Put attachments and clips without KEY into this file. Default: refuse them.",
 )
-@force_option
-@json_option
+@shared_options.force
+@shared_options.json
 def split_command(
     file: str, folder: str, by: str, rest: str | None, force: bool, as_json: bool
 ) -> Exit:
@@ -153,8 +153,8 @@ def split_command(
     is_flag=True,
     help="Copy content that two files share under one name only once.",
 )
-@force_option
-@json_option
+@shared_options.force
+@shared_options.json
 def merge_command(
     sources: tuple[str, ...],
     output: str,

@@ -16,17 +16,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.cli.common import (
-    Exit,
-    Failure,
-    binary_output,
-    check_new,
-    echo,
-    errors_about,
-    literal,
-    plural,
-    say,
-)
+from mcz.cli.common import Exit, Failure, check_new, errors_about
+from mcz.cli.shared_options import literal
+from mcz.cli.terminal import binary_output, echo, plural, say
 from mcz.errors import MczError, OptionError, SourceError
 from mcz.model.motion import Skeleton
 from mcz.model.text_format import cell_text

@@ -14,28 +14,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import click
 import numpy as np
 
-from mcz.cli.common import (
-    EXIT_CODES,
-    Exit,
-    Failure,
-    binary_output,
-    errors_about,
-    plural,
-    printable,
-    require_file,
-    say,
-    text_output,
-)
-from mcz.cli.hints import OPTION_HINTS
+from mcz.cli import shared_options
+from mcz.cli.common import EXIT_CODES, OPTION_HINTS, Exit, Failure, errors_about, require_file
 from mcz.cli.lazy import lazy_group
-from mcz.cli.options import (
-    force_option,
-    param_option,
-    rate_option,
-    token_option,
-    unit_option,
-    up_option,
-)
 from mcz.cli.standard_input import (
     NAME,
     NUMBER,
@@ -48,6 +29,7 @@ from mcz.cli.standard_input import (
     report_live,
     skeleton_in,
 )
+from mcz.cli.terminal import binary_output, plural, printable, say, text_output
 from mcz.errors import TruncatedError
 from mcz.model.text_format import spreadsheet_cell
 
@@ -95,7 +77,7 @@ WARN_AFTER = 5.0  # seconds of frames
     default=0,
     help="Wait for N clients before the first row is read (with --listen).",
 )
-@token_option("Require this token from clients.")
+@shared_options.token("Require this token from clients.")
 @click.option(
     "--codec",
     metavar="NAME",
@@ -103,10 +85,10 @@ WARN_AFTER = 5.0  # seconds of frames
     show_default=True,
     help="Set the codec, which must work frame by frame.",
 )
-@param_option
-@rate_option("Set the frame rate (120, 29.97, 30000/1001).")
-@unit_option("the numbers")
-@up_option("Set the up axis of the numbers.")
+@shared_options.params
+@shared_options.rate("Set the frame rate (120, 29.97, 30000/1001).")
+@shared_options.unit("the numbers")
+@shared_options.up("Set the up axis of the numbers.")
 @click.option("--name", metavar="NAME", default="live", help="Name the clip.  [default: live]")
 @click.option(
     "--skeleton",
@@ -129,7 +111,7 @@ WARN_AFTER = 5.0  # seconds of frames
     help="Tell clients every SECONDS that the stream continues while no row arrives; 0: never.  "
     "[default: 5 with --listen, else 0]",
 )
-@force_option
+@shared_options.force
 def stream_encode_command(
     output: str | None,
     listen: str | None,
@@ -235,7 +217,7 @@ def _push_all(rows: Rows, writer: LiveWriter, heart: Heartbeat) -> None:
 @click.option(
     "--connect", metavar="HOST:PORT", help="Read from this address over TCP; implies --join."
 )
-@token_option("Send this token to the server.")
+@shared_options.token("Send this token to the server.")
 @click.option(
     "--lost",
     type=click.Choice(("refuse", "missing", "hold", "linear")),
@@ -257,7 +239,7 @@ def _push_all(rows: Rows, writer: LiveWriter, heart: Heartbeat) -> None:
     is_flag=True,
     help="Smooth coarsely coded positions; rows come 12 frames late.",
 )
-@rate_option("Set the frame rate of a stream that states none (with --post-filter).")
+@shared_options.rate("Set the frame rate of a stream that states none (with --post-filter).")
 @click.option("--float32", "binary", is_flag=True, help="Print little-endian binary32 rows.")
 @click.option("--states", is_flag=True, help="Print which frames are concealed or missing.")
 def stream_decode_command(

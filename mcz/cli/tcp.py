@@ -13,8 +13,9 @@ from threading import Condition, Event, Lock, Thread
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, BinaryIO
 
-from mcz.cli.common import Exit, Failure, errors_about, say
+from mcz.cli.common import Exit, Failure, errors_about
 from mcz.cli.standard_input import InputWaiter
+from mcz.cli.terminal import say
 
 if TYPE_CHECKING:
     from mcz.files.live.writer import LiveWriter

@@ -12,6 +12,7 @@ import re
 import sys
 import time
 import unicodedata
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, BinaryIO, TextIO
 
 import click
@@ -163,6 +164,40 @@ class _Escaping(io.BytesIO):
 
     def flush(self) -> None:
         self._below.flush()
+
+
+WIDEST_CELL = 48  # characters that the columns of a table are aligned to
+
+
+def plural(count: int, word: str) -> str:
+    """
+    >>> plural(1, "clip"), plural(2400, "frame")
+    ('1 clip', '2,400 frames')
+    """
+    return f"{count:,} {word}" if count == 1 else f"{count:,} {word}s"
+
+
+def table(rows: Sequence[Sequence[str]], right: str = "") -> list[str]:
+    """Rows as lines of aligned columns, the first a heading; an "r" in ``right`` aligns right.
+
+    A cell of more than ``WIDEST_CELL`` characters shifts only the rest of its own row.
+
+    >>> table([["name", "n"], ["walk", "240"]], "lr")
+    ['name    n', 'walk  240']
+    """
+    rows = [[printable(cell) for cell in row] for row in rows]
+    widths = [
+        max((len(cell) for cell in column if len(cell) <= WIDEST_CELL), default=0)
+        for column in zip(*rows, strict=True)
+    ]
+    sides = right.ljust(len(widths), "l")
+    return [
+        "  ".join(
+            cell.rjust(width) if side == "r" else cell.ljust(width)
+            for cell, width, side in zip(row, widths, sides, strict=True)
+        ).rstrip()
+        for row in rows
+    ]
 
 
 PATIENCE = 1.0  # seconds of work before the line appears

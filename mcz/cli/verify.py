@@ -9,30 +9,20 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mcz.cli import shared_options
 from mcz.cli.common import (
+    OPTION_HINTS,
     Exit,
     Failure,
     bytes_or_path,
     check_new,
-    echo,
     errors_about,
+    in_options,
     open_input,
-    plural,
-    print_json,
     require_file,
-    say,
     write_output,
 )
-from mcz.cli.hints import OPTION_HINTS, in_options
-from mcz.cli.options import (
-    decoded_option,
-    force_option,
-    jobs_option,
-    json_option,
-    threads_option,
-    where_option,
-)
-from mcz.cli.terminal import Progress, json_text
+from mcz.cli.terminal import Progress, echo, json_text, plural, print_json, say
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
 from mcz.model.types import JsonObject
 
@@ -59,12 +49,12 @@ if TYPE_CHECKING:
 @click.option(
     "--date", metavar="DATE", help="Set the date of the report. Default: now; 'none' leaves it out."
 )
-@where_option
-@decoded_option
-@threads_option
-@force_option
-@jobs_option
-@json_option
+@shared_options.where
+@shared_options.max_decoded
+@shared_options.threads
+@shared_options.force
+@shared_options.jobs
+@shared_options.json
 def verify_command(
     file: str,
     source: str | None,

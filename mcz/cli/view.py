@@ -13,38 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import (
-    EXIT_CODES,
-    Exit,
-    Failure,
-    check_new,
-    echo,
-    errors_about,
-    plural,
-    print_json,
-    say,
-)
-from mcz.cli.hints import OPTION_HINTS
-from mcz.cli.options import (
-    EFFORTS,
-    arrays_option,
-    clips_option,
-    decoded_option,
-    force_option,
-    json_option,
-    model_option,
-    param_option,
-    rate_option,
-    salvage_option,
-    skeleton_option,
-    threads_option,
-    to_bytes,
-    unit_option,
-    up_option,
-    where_option,
-)
+from mcz.cli import shared_options
+from mcz.cli.common import EXIT_CODES, OPTION_HINTS, Exit, Failure, check_new, errors_about
 from mcz.cli.outputs import resolve_output
-from mcz.cli.terminal import say_json
+from mcz.cli.shared_options import EFFORTS, to_bytes
+from mcz.cli.terminal import echo, plural, print_json, say, say_json
 from mcz.model.extras import import_extra
 from mcz.model.types import JsonObject, Settings
 
@@ -90,22 +63,22 @@ LOOPBACK = "127.0.0.1"
     default=0,
     help="Listen on this port. Default: any free one.",
 )
-@skeleton_option("Use this ASF for an AMC, or none. Default: found as in mcz encode.")
-@rate_option()
-@unit_option("a file that states none")
-@up_option("Set the up axis of a file that states none.")
-@arrays_option
-@model_option
-@salvage_option
-@clips_option
-@where_option
+@shared_options.skeleton("Use this ASF for an AMC, or none. Default: found as in mcz encode.")
+@shared_options.rate()
+@shared_options.unit("a file that states none")
+@shared_options.up("Set the up axis of a file that states none.")
+@shared_options.arrays
+@shared_options.model
+@shared_options.salvage
+@shared_options.clips
+@shared_options.where
 @click.option(
     "--codec",
     metavar="NAME",
     help="Encode the clips with this codec (with -o). Default: as they are.",
 )
 @click.option("--effort", type=click.Choice(EFFORTS), help="Choose the lossless codec (with -o).")
-@param_option
+@shared_options.params
 @click.option(
     "--max-size",
     "most",
@@ -113,10 +86,10 @@ LOOPBACK = "127.0.0.1"
     callback=to_bytes,
     help="Limit the size of the page: 80M or 2G (with -o). Default: 50M.",
 )
-@decoded_option
-@force_option
-@threads_option
-@json_option
+@shared_options.max_decoded
+@shared_options.force
+@shared_options.threads
+@shared_options.json
 def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **options: Any) -> Exit:
     """Show motions in the browser: files, folders of them, URLs of an .mcz.
 

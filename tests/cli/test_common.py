@@ -12,10 +12,10 @@ import click
 import pytest
 
 import mcz
-from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, errors_about, run, table, write_output
+from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, errors_about, run, write_output
 from mcz.cli.lazy import OTHER_NAMES
 from mcz.cli.main import COMMANDS, cli
-from mcz.cli.terminal import Progress, say
+from mcz.cli.terminal import Progress, say, table
 from mcz.errors import AccessError, ChecksumError, ExistsError, MczError, OptionError
 from tests.motions import smooth
 

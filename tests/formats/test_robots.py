@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import mcz
-from mcz.cli.options import ARRAYS, ROBOTS
+from mcz.cli.shared_options import ARRAYS, ROBOTS
 from mcz.sources.arrays.skeletons import KINDS
 from mcz.sources.robots import robot_layouts
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import click
 
 from mcz.bench.tasks import Cache, Runner, default_folder
+from mcz.cli import shared_options
 from mcz.cli.codecs import show
 from mcz.cli.common import Exit, errors_about, require_file, run
-from mcz.cli.options import json_option, unit_option
 from mcz.cli.terminal import Progress
 from tools.papers.hou2016.run import hou2016
 from tools.papers.khan2014.run import khan2014
@@ -26,7 +26,7 @@ PAPERS = {"khan2014": khan2014, "khan2016": khan2016, "hou2016": hou2016, "kwak"
 @click.command()
 @click.argument("paper", type=click.Choice([*PAPERS, "all"]))
 @click.argument("clips", nargs=-1, required=True, type=click.Path())
-@unit_option("files that state none")
+@shared_options.unit("files that state none")
 @click.option(
     "--out",
     metavar="DIR",
@@ -37,7 +37,7 @@ PAPERS = {"khan2014": khan2014, "khan2016": khan2016, "hou2016": hou2016, "kwak"
     "--jobs", metavar="N", type=click.IntRange(1), help="Processes. Default: one a processor."
 )
 @click.option("--cache/--no-cache", default=True, help="Reuse earlier results. Default: do.")
-@json_option
+@shared_options.json
 def command(
     paper: str,
     clips: tuple[str, ...],

@@ -4,19 +4,82 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from fractions import Fraction
 from functools import wraps
+from typing import Any
 
 import click
 
-from mcz.cli.common import Exit, Failure, echo, require_file, to_frames, to_params, to_rate
+from mcz.cli.common import Exit, Failure, require_file
 from mcz.cli.outputs import resolve_output
-from mcz.model.types import Settings
+from mcz.cli.terminal import echo
+from mcz.model.types import JsonObject, Settings
 
 EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
 RATE_HELP = "Set the frame rate of files that state none (120, 29.97, 30000/1001)."
 ITS_RATE_HELP = "Set the frame rate (120, 29.97, 30000/1001), replacing the one in the source."
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}  # cm, as for the codec posewave
 Function = Callable[..., object]
+
+
+def combine(*options: Callable[[Function], Function]) -> Callable[[Function], Function]:
+    """A decorator that adds several options, in the order of the help."""
+
+    def add_all(function: Function) -> Function:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return add_all
+
+
+def to_frames(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[int, int | None] | None:
+    """Parse ``A:B``: frames A <= f < B counted from 0; either end may be left out."""
+    if value is None:
+        return None
+    start, colon, stop = value.partition(":")
+    digits = all(re.fullmatch("[0-9]{1,16}", part) for part in (start, stop) if part)
+    if not colon or not digits or (start and stop and int(start) > int(stop)):
+        raise click.BadParameter(f"{value!r} is not a range A:B of frames with A <= B")
+    return int(start or 0), int(stop) if stop else None
+
+
+def to_rate(ctx: click.Context, param: click.Parameter, value: str | None) -> Fraction | None:
+    """Parse a rate: frames a second as ``120``, ``29.97`` or ``30000/1001``."""
+    if value is None:
+        return None
+    rate = Fraction(0)
+    if re.fullmatch(r"[0-9]{1,15}(\.[0-9]{1,15}|/0*[1-9][0-9]{0,14})?", value):
+        rate = Fraction(value)
+    if rate <= 0:
+        raise click.BadParameter(f"{value!r} is not a rate such as 120, 29.97 or 30000/1001")
+    return rate
+
+
+def to_params(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> JsonObject:
+    """Parse ``KEY=VALUE``; numbers and truths are converted."""
+    pairs = {}
+    for value in values:
+        key, equals, text = value.partition("=")
+        if not equals or not key:
+            raise click.BadParameter(f"{value!r} is not KEY=VALUE")
+        pairs[key] = literal(text)
+    return pairs
+
+
+def literal(text: str) -> Any:
+    """
+    >>> literal("3"), literal("4.4"), literal("true"), literal("bior4.4")
+    (3, 4.4, True, 'bior4.4')
+    """
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text, text)
 
 
 def to_bytes(ctx: click.Context, param: click.Parameter, value: str | None) -> int | None:
@@ -38,7 +101,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
         ctx.exit()
 
 
-version_option = click.option(
+version = click.option(
     "--version",
     is_flag=True,
     is_eager=True,
@@ -47,12 +110,12 @@ version_option = click.option(
     help="Print the version and exit.",
 )
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+json = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 
-force_option = click.option("--force", is_flag=True, help="Overwrite existing files.")
+force = click.option("--force", is_flag=True, help="Overwrite existing files.")
 
 
-def output_option(function: Function) -> Function:
+def output(function: Function) -> Function:
     """``-o``; by default the command replaces its input file."""
 
     @wraps(function)
@@ -69,11 +132,11 @@ def output_option(function: Function) -> Function:
     )(command)
 
 
-salvage_option = click.option(
+salvage = click.option(
     "--salvage", is_flag=True, help="Read the intact parts of a damaged file; report the rest."
 )
 
-decoded_option = click.option(
+max_decoded = click.option(
     "--max-decoded",
     metavar="BYTES",
     callback=to_bytes,
@@ -82,7 +145,7 @@ decoded_option = click.option(
 )
 
 
-def threads_option(function: Function) -> Function:
+def threads(function: Function) -> Function:
     """``--threads``, the argument ``threads`` of ``mcz.open`` and ``mcz.write``."""
 
     @wraps(function)
@@ -102,7 +165,7 @@ def threads_option(function: Function) -> Function:
     )(command)
 
 
-def jobs_option(function: Function) -> Function:
+def jobs(function: Function) -> Function:
     """``--jobs``, the argument ``jobs`` of ``mcz.pack`` and others, by default all cores."""
 
     @wraps(function)
@@ -121,7 +184,7 @@ def jobs_option(function: Function) -> Function:
     )(command)
 
 
-def copies_option(default: str) -> Callable[[Function], Function]:
+def copies(default: str) -> Callable[[Function], Function]:
     """``--copies``, the argument ``copies`` of ``mcz.encode`` and others, None: ``default``."""
     return click.option(
         "--copies/--no-copies",
@@ -131,7 +194,7 @@ def copies_option(default: str) -> Callable[[Function], Function]:
     )
 
 
-clips_option = click.option(
+clips = click.option(
     "--clip",
     "clips",
     metavar="NAME",
@@ -149,7 +212,7 @@ def _to_query(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     return value
 
 
-where_option = click.option(
+where = click.option(
     "--where",
     metavar="QUERY",
     callback=_to_query,
@@ -158,13 +221,13 @@ where_option = click.option(
 )
 
 
-def token_option(what: str) -> Callable[[Function], Function]:
+def token(what: str) -> Callable[[Function], Function]:
     """``--token``, the argument ``token``; ``what`` begins its help."""
     hint = "Use MCZ_TOKEN to keep it out of the process list. It is not encryption."
     return click.option("--token", metavar="TEXT", envvar="MCZ_TOKEN", help=f"{what} {hint}")
 
 
-param_option = click.option(
+params = click.option(
     "--param",
     "params",
     metavar="KEY=VALUE",
@@ -187,7 +250,7 @@ def _to_unit(ctx: click.Context, param: click.Parameter, value: str | None) -> s
     return value
 
 
-def unit_option(what: str) -> Callable[[Function], Function]:
+def unit(what: str) -> Callable[[Function], Function]:
     """``--unit``, the argument ``unit``, the length unit of ``what``."""
     return click.option(
         "--unit",
@@ -197,7 +260,7 @@ def unit_option(what: str) -> Callable[[Function], Function]:
     )
 
 
-def up_option(what: str) -> Callable[[Function], Function]:
+def up(what: str) -> Callable[[Function], Function]:
     """``--up``, the argument ``up``; ``what`` is its help."""
     return click.option("--up", type=click.Choice(("x", "y", "z", "-x", "-y", "-z")), help=what)
 
@@ -205,20 +268,20 @@ def up_option(what: str) -> Callable[[Function], Function]:
 ARRAYS = ("positions", "rotation-vectors", "quaternions-wxyz", "quaternions-xyzw")
 ROBOTS = ("unitree-g1-29", "unitree-g1-23", "unitree-h1", "unitree-h1-2", "booster-t1")
 
-arrays_option = click.option(
+arrays = click.option(
     "--arrays",
     type=click.Choice((*ARRAYS, *ROBOTS)),
     help="Set the meaning of the numbers of a plain .npy, .npz or .pkl, or name a robot's columns.",
 )
 
-model_option = click.option(
+model = click.option(
     "--model",
     metavar="NPZ",
     help="Read the bone lengths of bodies in an .npz from your model file of the SMPL family. "
     "{gender} is replaced by the gender of the take, {body} by smpl, smplh or smplx.",
 )
 
-key_error_option = click.option(
+key_error = click.option(
     "--key-error",
     metavar="MM",
     type=click.FloatRange(min=0),
@@ -227,23 +290,23 @@ key_error_option = click.option(
 )
 
 
-def skeleton_option(help_text: str) -> Callable[[Function], Function]:
+def skeleton(help_text: str) -> Callable[[Function], Function]:
     """``--skeleton``, the argument ``skeleton``: the path of an ASF."""
     path = click.Path(readable=False)
     return click.option("--skeleton", metavar="FILE.asf", type=path, help=help_text)
 
 
-def frames_option(help_text: str) -> Callable[[Function], Function]:
+def frames(help_text: str) -> Callable[[Function], Function]:
     """``--frames``, the argument ``frames``: a range."""
     return click.option("--frames", metavar="A:B", callback=to_frames, help=help_text)
 
 
-def rate_option(help_text: str = RATE_HELP) -> Callable[[Function], Function]:
+def rate(help_text: str = RATE_HELP) -> Callable[[Function], Function]:
     """``--rate``, the argument ``rate``, by default of files that state none."""
     return click.option("--rate", metavar="R", callback=to_rate, help=help_text)
 
 
-force_rate_option = click.option(
+force_rate = click.option(
     "--force-rate", is_flag=True, help="Use --rate even for files that state another."
 )
 
@@ -270,7 +333,7 @@ def check_force_rate(options: Settings) -> None:
         raise Failure("--force-rate needs --rate", Exit.USAGE)
 
 
-def encoding_options(function: Function) -> Function:
+def encoding(function: Function) -> Function:
     """``--codec --effort --param --unit --up ...``, the arguments of those names."""
     options = (
         click.option(
@@ -288,11 +351,11 @@ def encoding_options(function: Function) -> Function:
             help="Encode lossy and limit the error of every point: a length (0.5mm), mm (1 mm), "
             "visible (5 mm) or preview (3 cm). Default codec: lossy.",
         ),
-        param_option,
-        unit_option("the source"),
-        up_option("Set the axis that points up. BVH and AMC state none."),
-        arrays_option,
-        model_option,
+        params,
+        unit("the source"),
+        up("Set the axis that points up. BVH and AMC state none."),
+        arrays,
+        model,
         click.option(
             "--verbatim", is_flag=True, help="Keep files that cannot be parsed as attachments."
         ),
@@ -316,7 +379,4 @@ def encoding_options(function: Function) -> Function:
             codec, params = codec or "lossy", params | {"max_error_cm": quality}
         return function(*args, codec=codec, params=params, **others)
 
-    encoding: Function = command
-    for option in reversed(options):
-        encoding = option(encoding)
-    return encoding
+    return combine(*options)(command)
