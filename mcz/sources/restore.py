@@ -18,12 +18,11 @@ from mcz.kernels import SPARE
 from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind, print_values, scan
-from mcz.model.numbers.rules import POWERS
+from mcz.model.numbers.rules import POWERS, TENS
 from mcz.model.numbers.text_grids import WIDEST
-from mcz.model.numbers.tokens import TENS
 from mcz.model.numbers.values import print_rules
 from mcz.model.types import Floats, Ints, Values
-from mcz.sources.text import Items
+from mcz.sources.text import Items, text_kernels
 from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, RowNotes, parse_layout
 from mcz.sources.text.rows import MAX_NUMBER
 
@@ -166,8 +165,6 @@ class Rows:
 
     def _odd(self, first: int, last: int) -> memoryview:
         """Rows with any cells; their size is known before any of them is written."""
-        from mcz.sources.text import text_kernels
-
         whole = (first, last) == (0, self.signal.n_rows)
         signal = self.signal if whole else self.signal.cut(first, last)
         runs = [(p, a - first, b - first) for p, a, b in _clipped(self.runs, first, last)]
@@ -212,8 +209,6 @@ class Rows:
         self, pattern: Pattern, values: Floats, row: int, rules: Ints
     ) -> tuple[int, memoryview]:
         """The number of rows printed, from ``row`` on, and their text."""
-        from mcz.sources.text import text_kernels
-
         items = self._items(pattern)
         room = pattern.gap_size + WIDEST * len(items.columns)
         n_rows = max(1, min(len(values), SCRATCH // max(1, room)))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
-from types import ModuleType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mcz.model.numbers import decimal_kernels as kernels
+from mcz.model.numbers import token_kernels
 from mcz.model.numbers.grid import Grid
 from mcz.model.numbers.rules import (
     BASE_32,
@@ -24,16 +23,14 @@ from mcz.model.numbers.rules import (
     MOST_DECIMALS,
     SHORT_FIXED,
     SIGNIFICANT,
+    TENS,
     GridFlag,
     GridKind,
 )
 from mcz.model.numbers.text_grids import match_tokens, printed_shapes, too_long
-from mcz.model.numbers.tokens import TENS, Tokens, kernels
+from mcz.model.numbers.token_kernels import Survey
+from mcz.model.numbers.tokens import Tokens
 from mcz.model.types import Bools, Floats, Ints
-
-if TYPE_CHECKING:
-    from mcz.model.numbers.token_kernels import Survey
-
 
 EXHAUSTIVE_TOKENS = 2**14  # up to so many tokens, all candidates are tried in order
 _SAMPLE = 4096  # tokens of the sample that suggests candidates; all tokens are counted
@@ -52,10 +49,9 @@ def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
 
 
 def _survey(tokens: Tokens, n_counted: int) -> Survey:
-    loops = _surveys()
-    sizes = loops.MOST_DECIMALS + 1, loops.MOST_DIGITS + 1, loops.N_STYLES
-    survey: Survey = loops.Survey(*(np.zeros(size, np.int64) for size in sizes))
-    loops.count_notations(tokens.fields, _STEP, n_counted, survey)
+    sizes = token_kernels.MOST_DECIMALS + 1, token_kernels.MOST_DIGITS + 1, token_kernels.N_STYLES
+    survey = Survey(*(np.zeros(size, np.int64) for size in sizes))
+    token_kernels.count_notations(tokens.fields, _STEP, n_counted, survey)
     return survey
 
 
@@ -115,12 +111,12 @@ def _ends(histogram: Sequence[int]) -> list[int]:
 
 def _styles(counts: Sequence[int]) -> tuple[int, int, int]:
     """Flags of the sign and the leading zero, of integral numbers, of the exponent: majorities."""
-    loops = _surveys()
-    sign = GridFlag.PLUS if counts[loops.SIGNED] > counts[loops.UNSIGNED] else 0
-    if counts[loops.NO_ZERO] > counts[loops.BARE_INTEGER]:
+    kinds = token_kernels
+    sign = GridFlag.PLUS if counts[kinds.SIGNED] > counts[kinds.UNSIGNED] else 0
+    if counts[kinds.NO_ZERO] > counts[kinds.BARE_INTEGER]:
         sign |= GridFlag.NO_ZERO
     points, bare, zeros = (
-        counts[style] for style in (loops.POINT_ONLY, loops.NO_POINT, loops.POINT_ZERO)
+        counts[style] for style in (kinds.POINT_ONLY, kinds.NO_POINT, kinds.POINT_ZERO)
     )
     tail = 0
     if points > bare and points > zeros:
@@ -128,17 +124,13 @@ def _styles(counts: Sequence[int]) -> tuple[int, int, int]:
     elif zeros > points + bare:
         tail = int(GridFlag.POINT_ZERO)
     exponent = 0
-    if counts[loops.THREE] > counts[loops.TWO]:
+    if counts[token_kernels.THREE] > counts[token_kernels.TWO]:
         exponent = int(GridFlag.EXPONENT3)
-    elif counts[loops.ONE] > counts[loops.TWO_OF_ONE]:
+    elif counts[token_kernels.ONE] > counts[token_kernels.TWO_OF_ONE]:
         exponent = int(GridFlag.EXPONENT1)
-    if counts[loops.CAPITAL] > counts[loops.SMALL]:
+    if counts[token_kernels.CAPITAL] > counts[token_kernels.SMALL]:
         exponent |= GridFlag.UPPER
     return int(sign), tail, int(exponent)
-
-
-def _surveys() -> ModuleType:
-    return importlib.import_module("mcz.model.numbers.token_kernels")
 
 
 def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
@@ -234,17 +226,16 @@ MANY_BITS = 2.0**26  # numbers of decimals above this are not binary32
 
 def printed_candidates(tokens: Tokens) -> Iterator[Candidate]:
     """Grids worth a try for a sample of the tokens, with the estimated bits of an ordinal."""
-    loops = kernels()
     shape = tokens.fields[:, 2]
-    known = shape & (loops.BAD | loops.SPECIAL) == 0
+    known = shape & (kernels.BAD | kernels.SPECIAL) == 0
     tokens, shape = tokens[known], shape[known]
     if not len(tokens):
         return
-    with_exponent = shape & loops.EXPONENT != 0
-    decimals = np.minimum(shape >> loops.FRACTION_DIGITS, 63)
+    with_exponent = shape & kernels.EXPONENT != 0
+    decimals = np.minimum(shape >> kernels.FRACTION_DIGITS, 63)
     if np.count_nonzero(with_exponent) * 2 > len(tokens):
         yield from _exponents(tokens[with_exponent], decimals[with_exponent])
-    significant = shape >> loops.SIGNIFICANT & 31
+    significant = shape >> kernels.SIGNIFICANT & 31
     if significant.max() < 10:
         return
     values = np.abs(tokens.values())
@@ -282,21 +273,20 @@ def _with_bits(base: int, flags: int, style: int) -> Candidate:
 
 def _exponents(tokens: Tokens, decimals: Ints) -> Iterator[Candidate]:
     """Candidates for numbers that mostly have exponents and equal digits: %.ne."""
-    loops = kernels()
     n = int(np.bincount(decimals).argmax())
     if n > MOST_DECIMALS:
         return
     shape, power = tokens.fields[:, 2], tokens.fields[:, 1]
-    written, short = shape >> loops.EXPONENT_DIGITS & 255, np.abs(power) < 100
+    written, short = shape >> kernels.EXPONENT_DIGITS & 255, np.abs(power) < 100
     flags = 0
     if np.count_nonzero(short & (written == 3)) > np.count_nonzero(short & (written == 2)):
         flags = int(GridFlag.EXPONENT3)
     elif np.count_nonzero(written == 1) > np.count_nonzero((written == 2) & (np.abs(power) < 10)):
         flags = int(GridFlag.EXPONENT1)
-    if np.count_nonzero(shape & loops.UPPER) * 2 > len(tokens):
+    if np.count_nonzero(shape & kernels.UPPER) * 2 > len(tokens):
         flags |= int(GridFlag.UPPER)
-    if np.count_nonzero(shape & loops.PLUS) > np.count_nonzero(
-        shape & (loops.PLUS | loops.MINUS) == 0
+    if np.count_nonzero(shape & kernels.PLUS) > np.count_nonzero(
+        shape & (kernels.PLUS | kernels.MINUS) == 0
     ):
         flags |= int(GridFlag.PLUS)
     if n < 15:

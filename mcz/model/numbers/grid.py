@@ -13,6 +13,8 @@ from mcz.errors import FormatError, OptionError
 from mcz.model.numbers import rules
 from mcz.model.numbers.rules import (
     CHECKED_KINDS,
+    NAN,
+    TENS,
     TEXT_KINDS,
     GridKind,
     binary32_magnitudes,
@@ -36,7 +38,7 @@ from mcz.model.numbers.text_grids import (
     token_ordinals32,
     uncertain_tokens,
 )
-from mcz.model.numbers.tokens import NAN, TENS, Texts, Tokens, nearest
+from mcz.model.numbers.tokens import Texts, Tokens, nearest
 from mcz.model.schema import FINITE, Adapted, Record
 from mcz.model.schema import field as record_field
 from mcz.model.types import Bools, Floats, Ints, Items, Values

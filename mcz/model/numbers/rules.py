@@ -12,9 +12,11 @@ from enum import IntEnum, IntFlag
 
 import numpy as np
 
-from mcz.model.numbers.tokens import EXACT_POWER, NAN, TENS
 from mcz.model.types import Floats, Ints
 
+NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the only NaN in values
+EXACT_POWER = 22  # 10^22 is the last power of ten that a binary64 holds exactly
+TENS = np.array([float(f"1e{power}") for power in range(EXACT_POWER + 1)])
 DECIMAL_LIMIT = 2**51 - 1  # below it, neighbors on a decimal grid are different binary64
 INTEGER_LIMIT = 2**53
 MIN_POWER, MAX_POWER = -307, 307  # of %g numbers: normal binary64, which 15 digits identify

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mcz.kernels import SPARE
+from mcz.model.numbers import decimal_kernels as kernels
 from mcz.model.numbers.rules import (
     BASE_32,
     BASE_64,
@@ -21,6 +22,7 @@ from mcz.model.numbers.rules import (
     FIXED_TEXT,
     SHORT_FIXED,
     SIGNIFICANT,
+    TENS,
     GridFlag,
     GridKind,
     binary32_magnitudes,
@@ -30,7 +32,7 @@ from mcz.model.numbers.rules import (
     limit,
     scaled_magnitudes,
 )
-from mcz.model.numbers.tokens import TENS, Texts, Tokens, kernels, nearest, scan_texts
+from mcz.model.numbers.tokens import Texts, Tokens, nearest, scan_texts
 from mcz.model.types import Bools, Floats, Ints
 
 _UNLIMITED = 1_000_000  # more decimals, and a larger exponent, than any number has
@@ -70,7 +72,7 @@ def match_tokens(
     ordinals = np.empty(len(tokens), np.int64)
     printed = np.empty(len(tokens), np.bool_)
     most = len(tokens) if allowed is None else allowed
-    misses = kernels().match(tokens.fields, rule, ordinals, printed, most)
+    misses = kernels.match(tokens.fields, rule, ordinals, printed, most)
     return ordinals, printed, misses
 
 
@@ -79,20 +81,19 @@ def uncertain_tokens(tokens: Tokens, kind: GridKind, digits: int, printed: Bools
 
     A normal number of 15 digits (6 in binary32) is its own shortest text.
     """
-    loops = kernels()
     power, shape = tokens.fields[:, 1], tokens.fields[:, 2]
     digits_kept, far = (6, 30) if kind == GridKind.TEXT32 else (15, 290)
     if digits > _JAVASCRIPT:
         return printed | too_long(tokens)
-    many: Bools = (shape >> loops.SIGNIFICANT & 31) > digits_kept
+    many: Bools = (shape >> kernels.SIGNIFICANT & 31) > digits_kept
     many |= np.abs(power) > far
     return (printed & many) | too_long(tokens)
 
 
 def too_long(tokens: Tokens) -> Bools:
     """Mask of the numbers with more digits than a match examines."""
-    loops = kernels()
-    result: Bools = tokens.fields[:, 2] & (loops.LONG | loops.BAD | loops.SPECIAL) == loops.LONG
+    marks = kernels.LONG | kernels.BAD | kernels.SPECIAL
+    result: Bools = tokens.fields[:, 2] & marks == kernels.LONG
     return result
 
 
@@ -118,7 +119,7 @@ def grid_texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negati
     out = np.empty(len(magnitudes) * WIDEST + SPARE, np.uint8)
     offsets = np.zeros(len(magnitudes) + 1, np.int64)
     rule = int(kind != GridKind.FIXED), low, high, flags
-    kernels().write(negative, np.ascontiguousarray(mantissas), fractions, rule, out, offsets)
+    kernels.write(negative, np.ascontiguousarray(mantissas), fractions, rule, out, offsets)
     return Texts(out[: offsets[-1]].copy(), offsets)
 
 
@@ -132,7 +133,7 @@ def float_digits(kind: GridKind, digits: int, magnitudes: Ints) -> tuple[Ints, I
     else:
         tokens = scan_texts([repr(x) for x in magnitudes.view(np.float64).tolist()])
     mantissa, power, shape = tokens.fields.T
-    return mantissa, (shape >> kernels().FRACTION_DIGITS) - power
+    return mantissa, (shape >> kernels.FRACTION_DIGITS) - power
 
 
 def text32_values(magnitudes: Ints) -> Floats:
@@ -247,23 +248,21 @@ def _restyle(line: str, flags: int) -> str:
 
 def _general(values: Floats, digits: int, flags: int, negative: Bools) -> Texts:
     fields = scan_texts([f"{x:.{digits - 1}e}" for x in values.tolist()]).fields
-    loops = kernels()
-    fractions = (fields[:, 2] >> loops.FRACTION_DIGITS) - fields[:, 1]
-    out = np.empty(len(values) * 48 + SPARE, np.uint8)  # as in textgrids: the longest has 17 digits
+    fractions = (fields[:, 2] >> kernels.FRACTION_DIGITS) - fields[:, 1]
+    out = np.empty(len(values) * WIDEST + SPARE, np.uint8)
     offsets = np.zeros(len(values) + 1, np.int64)
     rule = 1, -4, digits, flags
-    loops.write(negative, np.ascontiguousarray(fields[:, 0]), fractions, rule, out, offsets)
+    kernels.write(negative, np.ascontiguousarray(fields[:, 0]), fractions, rule, out, offsets)
     return Texts(out[: offsets[-1]].copy(), offsets)
 
 
 def printed_shapes(tokens: Tokens, style: int) -> Bools:
     """Tokens of the shape that the style prints."""
-    loops = kernels()
     shape = tokens.fields[:, 2]
-    good: Bools = shape & (loops.BAD | loops.SPECIAL) == 0
+    good: Bools = shape & (kernels.BAD | kernels.SPECIAL) == 0
     if SIGNIFICANT < style < EXPONENT:
         return good
     decimals = style - EXPONENT if style >= EXPONENT else style % SHORT_FIXED
-    good &= (shape & loops.EXPONENT != 0) == (style >= EXPONENT)
-    good &= shape >> loops.FRACTION_DIGITS == decimals
+    good &= (shape & kernels.EXPONENT != 0) == (style >= EXPONENT)
+    good &= shape >> kernels.FRACTION_DIGITS == decimals
     return good

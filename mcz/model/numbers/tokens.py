@@ -5,32 +5,24 @@ SPEC.md, "Decimal and binary64", is normative for ``nearest``.
 
 from __future__ import annotations
 
-import importlib
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
+from mcz.model.numbers import decimal_kernels as kernels
+from mcz.model.numbers import token_kernels
+from mcz.model.numbers.rules import EXACT_POWER, NAN, TENS
 from mcz.model.text_format import quote
 from mcz.model.types import Bools, Floats, Ints
 
-NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the only NaN in values
-EXACT_POWER = 22  # 10^22 is the last power of ten that a binary64 holds exactly
-TENS = np.array([float(f"1e{power}") for power in range(EXACT_POWER + 1)])
-
 _NAN_TEXT = re.compile(rb"[-+]?(nan(\(\w*\))?|\d\.#(q?nan|snan|ind)\d*)", re.IGNORECASE)  # TEXT-04
 _INF_TEXT = re.compile(rb"[-+]?(inf(inity)?|\d\.#inf\d*)", re.IGNORECASE)  # TEXT-04
-
-
-def kernels() -> ModuleType:
-    """The compiled loops, imported on first use."""
-    return importlib.import_module("mcz.model.numbers.decimal_kernels")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,12 +100,12 @@ class Tokens:
 
     def bad(self) -> Bools:
         """Mask of the tokens that are not numbers; nan and inf are numbers here."""
-        result: Bools = (self.fields[:, 2] & kernels().BAD) != 0
+        result: Bools = (self.fields[:, 2] & kernels.BAD) != 0
         return result
 
     def styled(self) -> Bools:
         """Mask of the tokens with a plus sign, or without a digit before their point."""
-        result: Bools = (self.fields[:, 2] & (kernels().PLUS | kernels().NO_INTEGER)) != 0
+        result: Bools = (self.fields[:, 2] & (kernels.PLUS | kernels.NO_INTEGER)) != 0
         return result
 
     def values(self) -> Floats:
@@ -123,9 +115,8 @@ class Tokens:
         return self.known[0].copy()
 
     def _values(self) -> Floats:
-        loops = kernels()
         out, slow = np.empty(len(self)), np.zeros(len(self), np.bool_)
-        if not loops.values(self.fields, TENS, out, slow):
+        if not kernels.values(self.fields, TENS, out, slow):
             return out
         slow_tokens = np.flatnonzero(slow)
         hard = self[slow_tokens]
@@ -135,7 +126,7 @@ class Tokens:
             raise SourceError(
                 f"{quote(hard.token(first))} is not a number", offset=hard.start[first]
             )
-        special = hard.fields[:, 2] & loops.SPECIAL != 0
+        special = hard.fields[:, 2] & kernels.SPECIAL != 0
         texts = hard.texts().tolist()
         if special.any():
             pairs = zip(texts, special.tolist(), strict=True)
@@ -155,16 +146,16 @@ def scan(
     whole.flags.writeable = False  # the view is read-only
     start = np.ascontiguousarray(start, np.int64)
     stop = np.ascontiguousarray(stop, np.int64)
-    loops = kernels()
-    scanner = importlib.import_module("mcz.model.numbers.token_kernels")
     fields = np.empty((len(start), 3), np.int64)
-    n_bad = scanner.scan(whole, start, stop, fields) if len(start) == len(stop) else scanner.OUTSIDE
-    if n_bad == scanner.OUTSIDE:
+    n_bad = token_kernels.OUTSIDE
+    if len(start) == len(stop):
+        n_bad = token_kernels.scan(whole, start, stop, fields)
+    if n_bad == token_kernels.OUTSIDE:
         raise IndexError(f"tokens lie outside a text of {len(whole)} bytes")
     tokens = Tokens(whole, start, stop, fields)
-    for index in np.flatnonzero(fields[:, 2] & loops.BAD).tolist() if n_bad else ():
+    for index in np.flatnonzero(fields[:, 2] & kernels.BAD).tolist() if n_bad else ():
         if not np.isfinite(_value(tokens.token(index), fallback=0.0)):
-            fields[index, 2] = loops.SPECIAL
+            fields[index, 2] = kernels.SPECIAL
     return tokens
 
 

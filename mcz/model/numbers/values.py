@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.kernels import SPARE, lacks_compiled_kernels
 from mcz.model.identity import IdentityCache
+from mcz.model.numbers import token_kernels, value_kernels
 from mcz.model.numbers.grid import Grid, grid_blocks
-from mcz.model.numbers.rules import DECIMAL_KINDS, MIN_POWER, POWERS, GridKind
+from mcz.model.numbers.rules import DECIMAL_KINDS, MIN_POWER, POWERS, TENS, GridKind
 from mcz.model.numbers.text_grids import WIDEST, printed_exponents
-from mcz.model.numbers.tokens import TENS
 from mcz.model.types import Bools, Floats, Ints, Values
 
 Bytes = NDArray[np.uint8]
@@ -36,7 +34,8 @@ def values_of(
         left = np.ones(len(grids), np.int64)
         if not lacks_compiled_kernels():
             left[:] = 0
-            _kernels("value").fill_values(ordinals, _known_rules(tuple(grids)), TENS, values, left)
+            integers = np.asarray(ordinals, np.int64)
+            value_kernels.fill_values(integers, _known_rules(tuple(grids)), TENS, values, left)
         for grid, columns in _unfilled_channels(left, grids):
             values[:, columns] = grid.values(ordinals[:, columns])
         return values
@@ -50,14 +49,12 @@ def ordinals_of(values: Values, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
 
     Results equal those of ``Grid.ordinals``.
     """
-    values = np.ascontiguousarray(values, np.float64)
-    ordinals, exact = np.empty(values.shape, np.int64), np.empty(values.shape, np.uint8)
+    numbers: Floats = np.ascontiguousarray(values, np.float64)
+    ordinals, exact = np.empty(numbers.shape, np.int64), np.empty(numbers.shape, np.uint8)
     left = np.zeros(len(grids), np.int64)
-    _kernels("value").fill_ordinals(
-        values, _rules(tuple(grids)), TENS, POWERS, ordinals, exact, left
-    )
+    value_kernels.fill_ordinals(numbers, _rules(tuple(grids)), TENS, POWERS, ordinals, exact, left)
     for grid, columns in _unfilled_channels(left, grids):
-        ordinals[:, columns], exact[:, columns] = grid.ordinals(values[:, columns])
+        ordinals[:, columns], exact[:, columns] = grid.ordinals(numbers[:, columns])
     return ordinals, exact.view(np.bool_)
 
 
@@ -72,22 +69,21 @@ def print_values(
     of_channels = print_rules(grids)
     out = np.empty(values.size * WIDEST + SPARE, np.uint8)
     numbers = np.asarray(values, np.float64)
-    used = _kernels("token").print_rows(numbers, of_channels, TENS, POWERS, out, base, start, size)
+    used = token_kernels.print_rows(numbers, of_channels, TENS, POWERS, out, base, start, size)
     return out[:used].copy()
 
 
 def print_rules(grids: Sequence[Grid]) -> Ints:
     """The rules (channels, RULE_SIZE) of ``print_rows``, which changes their last column."""
     rules = {grid: _print_rule(grid) for grid in dict.fromkeys(grids)}
-    size = _kernels("token").RULE_SIZE
+    size = token_kernels.RULE_SIZE
     return np.array([rules[grid] for grid in grids], np.int64).reshape(-1, size)
 
 
 def _print_rule(grid: Grid) -> tuple[int, ...]:
     """The rules by which the compiled loop prints numbers of a grid."""
-    loops = _kernels("value")
     if grid.kind not in DECIMAL_KINDS:
-        return loops.OTHER, *[0] * 7
+        return value_kernels.OTHER, *[0] * 7
     digits, *exponents = printed_exponents(grid.kind, grid.digits)
     trim = int(grid.kind != GridKind.FIXED)
     return digits, grid.digits, grid.limit, trim, *exponents, grid.flags, 0
@@ -104,21 +100,16 @@ def _unfilled_channels(
 
 @lru_cache(maxsize=64)
 def _rules(grids: tuple[Grid, ...]) -> Ints:
-    loops = _kernels("value")
-    rules = np.empty((len(grids), loops.RULE_SIZE), np.int64)
+    rules = np.empty((len(grids), value_kernels.RULE_SIZE), np.int64)
     for rule, grid in zip(rules, grids, strict=True):
         match grid.kind:
             case GridKind.GENERAL:
                 rule[:] = grid.digits, MIN_POWER + 1 - grid.digits, grid.limit
             case GridKind.FIXED | GridKind.TRIMMED:
-                rule[:] = loops.FIXED, grid.digits, grid.limit
+                rule[:] = value_kernels.FIXED, grid.digits, grid.limit
             case _:
-                rule[:] = loops.OTHER, 0, 0
+                rule[:] = value_kernels.OTHER, 0, 0
     return rules
 
 
 _known_rules = IdentityCache(_rules)
-
-
-def _kernels(what: str) -> ModuleType:
-    return importlib.import_module(f"mcz.model.numbers.{what}_kernels")

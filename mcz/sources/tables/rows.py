@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
+from mcz.model.numbers import decimal_kernels as kernels
 from mcz.model.numbers import scan
 from mcz.model.text_format import quote
 from mcz.sources.tables.csv_text import BLANK_CELLS, cell_spans
@@ -297,8 +298,6 @@ def _move_pattern(pattern: Pattern, zeros: dict[int, bytes]) -> Pattern:
 
 def _shared_zeros(data: bytes, rows: Rows, columns: Sequence[int]) -> bytes:
     """The zeros that end all tokens of the columns, with the point if nothing is before them."""
-    from mcz.model.numbers import decimal_kernels as kernels
-
     chosen = list(columns)
     start, stop = rows.start[:, chosen].ravel(), rows.stop[:, chosen].ravel()
     if not len(start) or not stop.all():

@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from mcz.errors import SourceError
+from mcz.model.numbers import decimal_kernels as kernels
 from mcz.model.numbers import scan
-from mcz.model.numbers.tokens import kernels
 from mcz.model.types import Bools, Ints
 from mcz.sources.tables.csv_text import DECIMAL_COMMA, NO_NUMBER, check_points
 from mcz.sources.text.layout import MAX_PATTERNS, Pattern, RowNotes, runs_of
@@ -76,11 +76,10 @@ class OddCells:
 
 def odd_cells(data: bytes, rows: Rows) -> OddCells:
     """The cells of ``rows`` that hold no plain number, and are not blank."""
-    loops = kernels()
     present = rows.stop > rows.start
     chosen = slice(None) if present.all() else np.flatnonzero(present)
     tokens = scan(data, rows.start.ravel()[chosen], rows.stop.ravel()[chosen])
-    odd = np.flatnonzero(tokens.fields[:, 2] & (loops.BAD | loops.SPECIAL))
+    odd = np.flatnonzero(tokens.fields[:, 2] & (kernels.BAD | kernels.SPECIAL))
     cells = tokens[odd]
     texts = cells.texts().tolist() if len(odd) else []
     is_bad = cells.bad()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from mcz.model.clock import TIMES, Timeline, times_fault
 from mcz.model.motion import Channel, Signal
 from mcz.model.numbers import Grid, GridKind, Tokens, scan
+from mcz.model.numbers import decimal_kernels as kernels
 from mcz.sources.tables.layout import Clock
 from mcz.sources.tables.signals import read_columns
 from mcz.sources.text.rows import Rows
@@ -69,8 +70,6 @@ def find_clock(
 
 
 def _decimals(tokens: Tokens) -> int:
-    from mcz.model.numbers import decimal_kernels as kernels
-
     places = int((tokens.fields[:, 2] >> kernels.FRACTION_DIGITS).max())
     return min(places, MOST_DECIMALS)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import SourceError
 from mcz.model.text_format import quote
-from mcz.sources.text import WORDS, Items
+from mcz.sources.text import WORDS, Items, text_kernels
 from mcz.sources.text.layout import (
     FRAME_NUMBER,
     FRAME_NUMBER_TEXT,
@@ -145,8 +145,6 @@ class _Reader:
     samples: list[tuple[int, list[Token], int]] = field(default_factory=list)
 
     def read(self, at: int) -> Rows:
-        from mcz.sources.text import text_kernels
-
         text = np.frombuffer(self.data, np.uint8)
         begin, last_end = at, at
         self._allocate(min(64, self._most_rows()))

@@ -13,8 +13,7 @@ import numpy as np
 from mcz.kernels import kernel, lacks_compiled_kernels, trailing_zeros, truncated
 from mcz.kernels.types import Floats, Ints
 from mcz.model.numbers import Grid, GridKind, values_of
-from mcz.model.numbers.rules import POWERS
-from mcz.model.numbers.tokens import TENS
+from mcz.model.numbers.rules import POWERS, TENS
 from mcz.model.numbers.value_kernels import decimal, magnitude_of
 
 EXACT = 1 << 53  # up to which quotients of floats are right
