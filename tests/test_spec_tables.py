@@ -23,7 +23,7 @@ from mcz.model.schema import parse
 from mcz.sources import FORMATS
 from mcz.sources.c3d import restore as c3d_restore
 from mcz.sources.c3d.layout import Kind
-from mcz.sources.tables import trc
+from mcz.sources.tables import opensim
 from mcz.sources.tables.layout import PHRASES, TableTemplate
 from mcz.sources.text import amc
 from mcz.sources.text.layout import Template
@@ -293,7 +293,7 @@ def test_worked_example_of_a_table() -> None:
     block = re.search(r"Worked example, the file\n\n```\n(.*?)\n```", text, re.S)
     assert block is not None
     file = block[1].replace("\n", "").replace("\\n", "\n").replace("\\t", "\t").encode()
-    motion = trc.read_trc(file)
+    motion = opensim.read_trc(file)
     source = motion.source
     assert source is not None
     assert source.detail == b"\1" + bytes(6)
@@ -316,7 +316,7 @@ def test_worked_example_of_a_table() -> None:
         [(0, 0, 1, 0), (1, 7, 1, 0), (1, 1, 6, 0)],
     )
     assert set(motion.signals[0].grids) == {Grid(GridKind.FIXED, 1)}
-    assert trc.write_trc(motion) == file
+    assert opensim.write_trc(motion) == file
 
 
 def test_fields_of_c3d() -> None:

@@ -51,7 +51,7 @@ MODULES = (
     "mcz.sources.tables.layout",
     "mcz.sources.arrays.layout",
     "mcz.sources.arrays.deflate",
-    "mcz.sources.tables.source",
+    "mcz.sources.text.source",
     "mcz.sources.c3d.layout",
     "mcz.container.recovery",
     "mcz.model.numbers",

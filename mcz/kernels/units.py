@@ -53,7 +53,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     "motion": (
         "mcz.codecs.transforms.post_filter",
         "mcz.container.recovery.kernels",
-        "mcz.exchange.conversion.scenes.key_kernels",
+        "mcz.exchange.conversion.scenes.keys",
         "mcz.kinematics.frame_kernels",
     ),
 }

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.sources import FORMATS, likely_formats
-from mcz.sources.tables.source import join_table_notes
+from mcz.sources.text.source import join_table_notes
 from tests.formats.c3d_files import c3d_files, make_c3d
 from tests.formats.csv_files import column_files, motive_files, vicon_files
 from tests.formats.mvnx_files import mvnx_files

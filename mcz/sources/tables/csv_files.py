@@ -33,12 +33,19 @@ from mcz.sources.tables.motive import HEAD, read_motive
 from mcz.sources.tables.restore import restore_table
 from mcz.sources.tables.rows import TableRows, lines_from, read_table, without_zeros
 from mcz.sources.tables.signals import read_columns, read_text, table_metadata, text_note
-from mcz.sources.tables.source import names_in, section_of, table_source
 from mcz.sources.tables.times import Times, read_times
 from mcz.sources.tables.vicon import AXIS, read_vicon
 from mcz.sources.text.layout import FRAME_NUMBER
 from mcz.sources.text.rows import Rows, counted_up, line_of
-from mcz.sources.text.source import BOM, check_text, text_encoding, text_start
+from mcz.sources.text.source import (
+    BOM,
+    check_text,
+    names_in,
+    section_of,
+    table_source,
+    text_encoding,
+    text_start,
+)
 
 SNIFFED = 2**16  # bytes at the start that tell the kind
 NAMES = ("csv", "motive", "vicon")

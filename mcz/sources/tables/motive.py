@@ -15,11 +15,17 @@ from mcz.model.motion import Channel, Joint, Motion, Skeleton
 from mcz.sources.tables.csv_text import count_columns, is_blank, texts_of, whole_cells
 from mcz.sources.tables.rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.sources.tables.signals import read_columns, read_text, table_metadata, text_note
-from mcz.sources.tables.source import named_count, names_in, section_of, table_source
 from mcz.sources.tables.times import Times, read_times, stated_rate
 from mcz.sources.text.layout import FRAME_NUMBER
 from mcz.sources.text.rows import counted_up, line_of
-from mcz.sources.text.source import BOM, text_encoding
+from mcz.sources.text.source import (
+    BOM,
+    named_count,
+    names_in,
+    section_of,
+    table_source,
+    text_encoding,
+)
 
 UNITS = {
     "meters": 100.0,

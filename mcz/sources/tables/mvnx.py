@@ -41,11 +41,18 @@ from mcz.sources.tables.signals import (
     read_text,
     table_metadata,
 )
-from mcz.sources.tables.source import names_in, section_of, table_source
 from mcz.sources.tables.text_columns import TextColumn, odd_cells, split_text
 from mcz.sources.tables.times import Times, read_times, stated_rate
 from mcz.sources.text.rows import Rows, counted_up, line_of
-from mcz.sources.text.source import MOST_JOINTS, check, check_text, text_encoding
+from mcz.sources.text.source import (
+    MOST_JOINTS,
+    check,
+    check_text,
+    names_in,
+    section_of,
+    table_source,
+    text_encoding,
+)
 
 MOST_BYTES = 2**24  # of a header, without the frames of calibration
 MOST_DEPTH = 32  # of elements in each other

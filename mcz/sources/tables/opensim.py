@@ -1,28 +1,188 @@
-"""STO and MOT (tables of OpenSim and SIMM): bytes -> Motion, and back.
+"""TRC, STO and MOT, the tables of OpenSim: bytes -> Motion, and back.
 
-SPEC.md, "The text of tables", is normative for the way back. Every column but the times is a joint
-without a parent, whose channels are plain scalars: what they move, only the model knows.
+SPEC.md, "The text of tables", is normative for the way back. In TRC every marker is a joint without
+a parent. The numbers of frames are those of the file; times follow from them, or are a signal.
+In STO and MOT every column but the times is such a joint, whose channels are plain scalars: what
+they move, only the model knows.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
 
 from mcz.errors import SourceError
-from mcz.model.motion import Channel, Joint, Motion, Skeleton
+from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Skeleton
 from mcz.model.numbers import scan
 from mcz.sources.tables.csv_text import check_points
-from mcz.sources.tables.restore import plain_storage, restore_table
+from mcz.sources.tables.layout import NEXT, SAME, UNIT_CM
+from mcz.sources.tables.restore import plain_storage, plain_trc, restore_table
 from mcz.sources.tables.rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.sources.tables.signals import read_columns, table_metadata
-from mcz.sources.tables.source import named_count, names_in, section_of, table_source
-from mcz.sources.tables.times import as_times, half_digits_of, rate_of_times, stated_rate
-from mcz.sources.text.rows import line_of
-from mcz.sources.text.source import check_text, text_encoding
+from mcz.sources.tables.times import (
+    Times,
+    as_times,
+    half_digits_of,
+    rate_of_times,
+    read_times,
+    stated_rate,
+)
+from mcz.sources.text.layout import FRAME_NUMBER
+from mcz.sources.text.rows import Rows, counted_up, line_of
+from mcz.sources.text.source import (
+    check_text,
+    named_count,
+    names_in,
+    section_of,
+    table_source,
+    text_encoding,
+)
+
+POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)
+
+_LABELS = re.compile(rb"(?i)[ \t]*frame#?[ \t]")
+_AXES = re.compile(rb"([Xx])([0-9]+)|([YyZz])([0-9]+)")
+_KEYS = re.compile(rb"(?i)[ \t]*datarate\b")
+
+
+@dataclass(frozen=True, slots=True)
+class _TrcHeader:
+    """Parsed header: ``values`` by key in lower case, and the offsets of labels and rows."""
+
+    values: dict[str, str]
+    count: tuple[int, int]  # where NumFrames is printed; (0, 0): nowhere
+    labels: tuple[int, int]  # the line of labels
+    rows: int
+
+
+def read_trc(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a TRC file; ``name`` becomes its name; the up axis is unknown.
+
+    Raises SourceError, with the number of the line.
+    """
+    check_text(data)
+    encoding = text_encoding(data)
+    header = _trc_header(data)
+    labels = _marker_names(data[slice(*header.labels)], encoding)
+    n_markers = max(len(labels), _widest(data, header.rows))
+    names = (*labels, *(f"marker {k + 1}" for k in range(len(labels), n_markers)))
+    time = 3 * n_markers
+    columns = [[FRAME_NUMBER], [time], *([c] for c in range(time))]
+    separator = b"\t" if b"\t" in data[header.rows :].partition(b"\n")[0] else None
+    table = read_table(data, header.rows, time + 1, columns, separator)
+    rows = without_zeros(data, counted_up(table.rows), ([time], range(time)))
+    markers = read_columns(data, rows, range(time))
+    joints = tuple(Joint(marker, channels=POSITION) for marker in names)
+    unit_cm = UNIT_CM.get(header.values.get("units", "").lower())
+    skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="")
+    times, note = _trc_times(data, rows, time, header.values)
+    text = _mark_header(data, header, rows.n_rows, names[: len(labels)])
+    signals = range(1 + len(times.signals))
+    section = section_of(text, (table.missing, times.clock), rows, names, signals)
+    motion = Motion(
+        skeleton,
+        (markers, *times.signals),
+        times.rate,
+        times.exact,
+        name,
+        table_metadata(encoding, [*note, *_count_notes(header.values, len(labels), rows.n_rows)]),
+        table_source("trc", data, [(section, rows, 1)]),
+        rows.numbers,
+    )
+    return motion if times.printed is None else motion.at_times(times.printed)
+
+
+def _trc_header(data: bytes) -> _TrcHeader:
+    """The header, which begins with PathFileType and ends before the first row."""
+    lines = lines_from(data, 0)
+    keys = next((k for k, (_, line) in enumerate(lines[:16]) if _KEYS.match(line)), None)
+    labels = next((k for k, (_, line) in enumerate(lines[:64]) if _LABELS.match(line)), None)
+    if labels is None:
+        raise SourceError(
+            "no line begins with Frame#; not a TRC file, or truncated", line=min(len(lines), 4)
+        )
+    values, count = {}, (0, 0)
+    if keys is not None and keys + 1 < labels:
+        names = lines[keys][1].decode("latin-1").split()
+        at, line = lines[keys + 1]
+        words = [(at + m.start(), m[0]) for m in re.finditer(rb"[^\t\r\n ]+", line)]
+        for key, (start, word) in zip(names, words, strict=False):
+            values[key.lower()] = word.decode("latin-1")
+            if key.lower() == "numframes":
+                count = start, start + len(word)
+    for at, line in lines[labels + 1 : labels + 16]:
+        if begins_with_number(line):
+            start = lines[labels][0]
+            return _TrcHeader(values, count, (start, start + len(lines[labels][1])), at)
+    raise SourceError("no row of numbers follows the marker names", line=labels + 2)
+
+
+def _marker_names(line: bytes, encoding: str) -> list[str]:
+    """The names of the markers: what stands after Frame# and Time."""
+    separator = b"\t" if b"\t" in line else None
+    cells = [cell.strip() for cell in line.split(separator)]
+    return [cell.decode(encoding) for cell in cells[2:] if cell]
+
+
+def _widest(data: bytes, at: int) -> int:
+    """Number of markers of the longest row."""
+    cells = max((line.rstrip().count(b"\t") for line in data[at:].split(b"\n")), default=1)
+    return max(0, -(-(cells - 1) // 3))
+
+
+def _trc_times(
+    data: bytes, rows: Rows, column: int, values: dict[str, str]
+) -> tuple[Times, list[str]]:
+    """The times, and notes on oddities."""
+    stated = [
+        rate for key in ("datarate", "camerarate") if (rate := stated_rate(values.get(key, "")))
+    ]
+    times = read_times(data, rows, column, stated)
+    rate, odd = times.rate, []
+    if stated and rate is None:
+        odd = ["the times are not uniform"]
+    elif stated and rate is not None and rate not in stated:
+        odd = [f"DataRate is {values['datarate'][:40]}, the times are {float(rate):g} a second"]
+    return times, [*odd, times.note]
+
+
+def _mark_header(
+    data: bytes, header: _TrcHeader, n_rows: int, names: Sequence[str]
+) -> tuple[bytes, bytes]:
+    """The header with marks for names, their numbers and the number of rows; and as it is."""
+    start, stop = header.labels
+    parts = (
+        named_count(data, 0, start, header.count, n_rows),
+        names_in(data[start:stop], names),
+        _AXES.sub(lambda m: m[1] + NEXT if m[1] else m[3] + SAME, data[stop : header.rows]),
+    )
+    return b"".join(parts), data[: header.rows]
+
+
+def _count_notes(values: dict[str, str], n_labels: int, n_rows: int) -> list[str]:
+    notes = []
+    declared = values.get("numframes", "")
+    if declared != str(n_rows):
+        notes.append(f"{declared[:40] or 'no'} frames are declared, {n_rows} are there")
+    declared = values.get("nummarkers", "")
+    if declared != str(n_labels):
+        notes.append(f"{declared[:40] or 'no'} markers are declared, {n_labels} are named")
+    return notes
+
+
+def write_trc(motion: Motion) -> bytes:
+    """The TRC file of ``motion``: its own source with its values, or a plain one.
+
+    Raises MotionError for what TRC cannot say; see ``plain_trc``.
+    """
+    if motion.source is None or motion.source.format != "trc":
+        motion = plain_trc(motion)
+    return restore_table(motion)
+
 
 PARTS = {1: ("value",), 3: ("x", "y", "z")}  # names of the numbers of a cell; else 1, 2, ...
 QUATERNION = ("w", "x", "y", "z")
@@ -34,7 +194,7 @@ _COUNTS = ("nrows", "datarows")
 
 
 @dataclass(frozen=True, slots=True)
-class _Header:
+class _StorageHeader:
     values: dict[str, str]  # by key in lower case
     count: tuple[int, int]  # where the number of rows is printed; (0, 0): nowhere
     labels: tuple[int, int]
@@ -58,9 +218,9 @@ def read_sto(data: bytes, name: str = "motion") -> Motion:
 def _read(data: bytes, name: str, format_name: str) -> Motion:
     check_text(data)
     encoding = text_encoding(data)
-    header = _header(data)
+    header = _storage_header(data)
     separator = b"\t" if b"\t" in data[header.rows :].partition(b"\n")[0] else None
-    names, sizes = _columns(data, header, separator, encoding)
+    names, sizes = _cell_sizes(data, header, separator, encoding)
     label, names, sizes = names[0], names[1:], sizes[1:]
     starts = [0, *accumulate(sizes)]
     time = starts[-1]
@@ -84,8 +244,8 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
     digits = half_digits_of(data, rows.stop[:, time], tokens)
     rate, exact = rate_of_times(times, digits, [stated] if stated else [])
     start, stop = header.labels
-    counted = named_count(data, 0, start, header.count, rows.n_rows)
-    marked = counted + names_in(data[start:stop], names) + data[stop : header.rows]
+    count = named_count(data, 0, start, header.count, rows.n_rows)
+    marked = count + names_in(data[start:stop], names) + data[stop : header.rows]
     text = marked, data[: header.rows]
     section = section_of(text, (table.missing, None), rows, names, [0, 1])
     return Motion(
@@ -99,7 +259,7 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
     )
 
 
-def _header(data: bytes) -> _Header:
+def _storage_header(data: bytes) -> _StorageHeader:
     end = _END.search(data)
     if end is None:
         raise SourceError("no line 'endheader'; not an STO or MOT file, or truncated", line=1)
@@ -122,14 +282,14 @@ def _header(data: bytes) -> _Header:
         elif begins_with_number(line):
             if labels is None:
                 break
-            return _Header(values, count, labels, at)
+            return _StorageHeader(values, count, labels, at)
     raise SourceError(
         "names and a row of numbers must follow endheader", line=line_of(data, end.end())
     )
 
 
-def _columns(
-    data: bytes, header: _Header, separator: bytes | None, encoding: str
+def _cell_sizes(
+    data: bytes, header: _StorageHeader, separator: bytes | None, encoding: str
 ) -> tuple[list[str], list[int]]:
     """The name of every column, and how many numbers a cell of it holds."""
     labels = data[slice(*header.labels)]

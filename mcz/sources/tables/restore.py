@@ -21,8 +21,8 @@ from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Ints
 from mcz.sources.restore import printed_count, text_limit, write_rows
 from mcz.sources.tables.layout import Clock, Section, build_table, fill, parse_sections
-from mcz.sources.tables.source import TableNotes
 from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, runs_of
+from mcz.sources.text.source import TableNotes
 
 INTEGERS = Grid(GridKind.FIXED)
 

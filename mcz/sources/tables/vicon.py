@@ -27,11 +27,10 @@ from mcz.sources.tables.rows import (
     without_zeros,
 )
 from mcz.sources.tables.signals import TEXT, read_columns, read_text, table_metadata, text_note
-from mcz.sources.tables.source import names_in, section_of, table_source
 from mcz.sources.tables.times import stated_rate
 from mcz.sources.text.layout import FRAME_NUMBER
 from mcz.sources.text.rows import Rows, counted_up, line_of
-from mcz.sources.text.source import text_encoding
+from mcz.sources.text.source import names_in, section_of, table_source, text_encoding
 
 Ints = NDArray[np.int64]
 

@@ -1,7 +1,7 @@
 """Motion as text: ASF, AMC and BVH.
 
 ``rows`` finds tokens and learns the patterns that lay them out; ``layout`` has these patterns, and
-the frames that deviate from them.
+the frames that deviate from them. ``source`` has encodings, and the sources of tables too.
 """
 
 from typing import NamedTuple

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.exchange.conversion.scenes.key_kernels import fill
-from mcz.exchange.conversion.scenes.keys import Keys, SceneKeys
+from mcz.exchange.conversion.scenes.keys import Keys, SceneKeys, interpolate_keys
 from mcz.exchange.conversion.scenes.nodes import COLORS, MARKER, SIDES, Node, Scene, Solid, solid_of
 from mcz.kinematics.chain import Floats
 from mcz.model.types import JsonObject
@@ -155,7 +154,7 @@ def _dense(keys: Keys | None, rest: Floats, times: Floats) -> NDArray[np.float32
     if len(keys.frames) == 1:
         return keys.values
     out = np.empty((len(times), keys.values.shape[1]))
-    fill(times, keys.frames, keys.values.astype(np.float64), 0, 0, out)
+    interpolate_keys(times, keys.frames, keys.values.astype(np.float64), 0, 0, out)
     return _float32(out)
 
 
