@@ -85,11 +85,12 @@ class Format:
         return self.suffixes[0]
 
 
-def _of(module: str, name: str) -> Callable[..., Any]:
+def _of(module: str, name: str, **fixed: object) -> Callable[..., Any]:
     """The function of a format's module, which is imported when it is called."""
 
     def call(*arguments: object, **options: object) -> Any:
-        return getattr(import_module(f"{__name__}.{module}"), name)(*arguments, **options)
+        function = getattr(import_module(f"{__name__}.{module}"), name)
+        return function(*arguments, **fixed, **options)
 
     return call
 
@@ -139,26 +140,26 @@ FORMATS: dict[str, Format] = {
                 (5, "c3d-outputs", "restate_outputs"),
             )
         ),
-        *(  # the table gives csv for .csv; which kind a file is, its reader finds
+        *(  # the table gives csv for .csv; the reader determines which kind a file is
             Format(
                 name,
                 format_id,
                 (".csv", ".tsv") if name == "csv" else (f".{name if kind else 'csv'}",),
-                _of(module, f"read{kind}"),
-                _of(module, f"write{kind}"),
+                _of(module, f"read{kind}", **options),
+                _of(module, f"write{kind}", **options),
                 _of("text.source", "join_table_notes"),
                 states_rate=True,
                 is_table=True,
                 restate=_of("stated_rates", "restate_table"),
                 is_motion=None if kind else _of("tables.csv_files", "is_motion"),
             )
-            for format_id, name, module, kind in (
-                (6, "trc", "tables.opensim", "_trc"),
-                (7, "mot", "tables.opensim", "_mot"),
-                (8, "sto", "tables.opensim", "_sto"),
-                (11, "csv", "tables.csv_files", ""),
-                (9, "motive", "tables.csv_files", ""),
-                (10, "vicon", "tables.csv_files", ""),
+            for format_id, name, module, kind, options in (
+                (6, "trc", "tables.opensim", "_trc", {}),
+                (7, "mot", "tables.opensim", "_storage", {"format_name": "mot"}),
+                (8, "sto", "tables.opensim", "_storage", {"format_name": "sto"}),
+                (11, "csv", "tables.csv_files", "", {}),
+                (9, "motive", "tables.csv_files", "", {}),
+                (10, "vicon", "tables.csv_files", "", {}),
             )
         ),
         Format(

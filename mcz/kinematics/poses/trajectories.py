@@ -6,6 +6,7 @@ next, (n_frames - 1,), NaN across a break in time.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,8 +108,7 @@ def velocities(
     frames has the same results as the whole. Arguments and errors are those of ``positions``;
     OptionError also if the times are unknown.
     """
-    window = _read_window(moving, joints, frames, unit, 1)
-    return as_type(_cut_window(velocities_of(window.places, window.steps), window), dtype)
+    return as_type(_derivative(moving, joints, frames, unit, 1, velocities_of), dtype)
 
 
 def accelerations(
@@ -125,36 +125,27 @@ def accelerations(
     time the value of the neighbor frame, NaN in a run of fewer than three. Otherwise as
     ``velocities``.
     """
-    window = _read_window(moving, joints, frames, unit, 2)
-    return as_type(_cut_window(accelerations_of(window.places, window.steps), window), dtype)
+    return as_type(_derivative(moving, joints, frames, unit, 2, accelerations_of), dtype)
 
 
-@dataclass(frozen=True, slots=True)
-class _Window:
-    """Positions of some frames and their neighbors; ``first`` and ``stop`` among ``places``.
+def _derivative(
+    moving: MotionLike,
+    joints: Joints,
+    frames: Frames,
+    unit: str | None,
+    reach: int,
+    derive: Callable[[Floats, Floats], Floats],
+) -> Floats:
+    """``derive`` of positions and of the seconds between frames, NaN across a break in time.
 
-    ``steps`` are the seconds from each of them to the next, NaN across a break in time.
+    Reads ``reach`` frames more on both sides, so that a part has the results of the whole.
     """
-
-    places: Floats
-    steps: Floats
-    first: int
-    stop: int
-
-
-def _read_window(
-    moving: MotionLike, joints: Joints, frames: Frames, unit: str | None, reach: int
-) -> _Window:
     scale = scale_to(moving.skeleton, unit)
     steps = known_timeline(moving.name, moving.timeline).steps
     start, stop = frame_range(moving, frames)
     low, high = max(0, start - reach), min(moving.n_frames, stop + reach)
     places = _positions(moving, joints, (low, high)) * scale
-    return _Window(places, steps[low : max(low, high - 1)], start - low, stop - low)
-
-
-def _cut_window(values: Floats, near: _Window) -> Floats:
-    return values[near.first : near.stop]
+    return derive(places, steps[low : max(low, high - 1)])[start - low : stop - low]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

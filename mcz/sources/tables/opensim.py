@@ -201,21 +201,12 @@ class _StorageHeader:
     rows: int
 
 
-def read_mot(data: bytes, name: str = "motion") -> Motion:
-    """The motion in a MOT file; see ``read_sto``."""
-    return _read(data, name, "mot")
-
-
-def read_sto(data: bytes, name: str = "motion") -> Motion:
-    """The motion in a STO file; ``name`` becomes its name.
+def read_storage(data: bytes, name: str = "motion", *, format_name: str) -> Motion:
+    """The motion in a STO or MOT file, by ``format_name``; ``name`` becomes its name.
 
     A frame rate is stated if the times are uniform. Raises SourceError, with the number of the
     line.
     """
-    return _read(data, name, "sto")
-
-
-def _read(data: bytes, name: str, format_name: str) -> Motion:
     check_text(data)
     encoding = text_encoding(data)
     header = _storage_header(data)
@@ -325,20 +316,11 @@ def _note(values: dict[str, str], n_rows: int) -> str:
     return f"{declared[:40]} frames are declared, {n_rows} are there"
 
 
-def write_sto(motion: Motion) -> bytes:
-    """The STO file of ``motion``: its own source with its values, or a plain one.
+def write_storage(motion: Motion, *, format_name: str) -> bytes:
+    """The STO or MOT file of ``motion``: its own source with its values, or a plain one.
 
-    Raises MotionError for what STO cannot say; see ``plain_storage``.
+    Raises MotionError for what these cannot hold; see ``plain_storage``.
     """
-    return _write(motion, "sto")
-
-
-def write_mot(motion: Motion) -> bytes:
-    """The MOT file of ``motion``, as ``write_sto``."""
-    return _write(motion, "mot")
-
-
-def _write(motion: Motion, format_name: str) -> bytes:
     if motion.source is None or motion.source.format != format_name:
         motion = plain_storage(motion, format_name)
     return restore_table(motion)
