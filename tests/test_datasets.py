@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 import mcz
 from mcz.exchange.datasets.feature_blocks import FolderCache, MemoryCache, to_size
 from mcz.exchange.datasets.field_table import FIELDS
-from mcz.exchange.datasets.samplers import split
+from mcz.exchange.datasets.samplers import split_members
 from mcz.kinematics.poses.conversions import from_matrices
 from tests.motions import smooth
 
@@ -318,7 +318,7 @@ def test_splits_are_whole_and_apart(items: list[tuple[str, int]], seed: int) -> 
     labels, weights = [label for label, _ in items], [weight for _, weight in items]
     if len(set(labels)) < 2:
         return
-    parts = split(labels, weights, {"train": 0.75, "test": 0.25}, seed)
+    parts = split_members(labels, weights, {"train": 0.75, "test": 0.25}, seed)
     assert sorted(parts["train"] + parts["test"]) == list(range(len(items)))
     homes = [{labels[number] for number in numbers} for numbers in parts.values()]
     assert all(homes) and not homes[0] & homes[1]

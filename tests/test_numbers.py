@@ -23,7 +23,7 @@ from mcz.model.numbers import (
     Tokens,
     choose_grid,
     decimal_kernels,
-    fit,
+    fit_grid,
     print_values,
     scan,
 )
@@ -357,7 +357,7 @@ def test_printed_means_the_same_text(texts: list[str], grid: Grid) -> None:
     good = [is_number(text) for text in texts]
     tokens = tokens_of(*texts)
     assert (~tokens.bad()).tolist() == good
-    chosen, fitted, fits = fit(tokens, [grid])
+    chosen, fitted, fits = fit_grid(tokens, [grid])
     assert chosen == choose_grid(tokens, [grid])
     assert chosen.texts(fitted[fits]).tolist() == tokens[fits].texts().tolist()
 

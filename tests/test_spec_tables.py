@@ -181,7 +181,7 @@ def test_grids() -> None:
     for kind in GridKind:
         for digits in range(256):
             style = digits + 63 if kind == GridKind.PRINTED and 128 < digits < 144 else 0
-            legal = rules.fault(kind, digits, 0, 1.0, style) is None
+            legal = rules.grid_fault(kind, digits, 0, 1.0, style) is None
             assert legal == ((kind, digits) in allowed), (kind, digits)
             if legal and kind != GridKind.PRINTED:
                 check_grid(Grid(kind, digits), *allowed[kind, digits])
@@ -189,7 +189,7 @@ def test_grids() -> None:
 
 def check_grid(grid: Grid, flags: int, most: str, ordinals: str) -> None:
     for flag in GridFlag:
-        legal = rules.fault(grid.kind, grid.digits, int(flag), 1.0) is None
+        legal = rules.grid_fault(grid.kind, grid.digits, int(flag), 1.0) is None
         assert legal == bool(flags & flag), (grid, flag)
     most = most.replace("^", "**").replace("digits", str(grid.digits))
     assert grid.limit == eval(most)
@@ -213,13 +213,13 @@ def test_styles_of_printed_grids() -> None:
                     limit = eval(most.replace("^", "**").replace("digits", str(digits)))
                     wanted[digits, style] = GridKind[kind], limit, flags
     for digits, style in product(range(256), range(256)):
-        legal = rules.fault(GridKind.PRINTED, digits, 0, 1.0, style) is None
+        legal = rules.grid_fault(GridKind.PRINTED, digits, 0, 1.0, style) is None
         assert legal == ((digits, style) in wanted), (digits, style)
     for (digits, style), (kind, limit, flags) in wanted.items():
         grid = Grid(GridKind.PRINTED, digits, style=style)
         assert (grid.limit, printed_base(grid).kind) == (limit, kind)
         for flag in GridFlag:
-            legal = rules.fault(GridKind.PRINTED, digits, int(flag), 1.0, style) is None
+            legal = rules.grid_fault(GridKind.PRINTED, digits, int(flag), 1.0, style) is None
             assert legal == bool(flags & flag), (grid, flag)
 
 

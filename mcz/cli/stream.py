@@ -191,9 +191,9 @@ def _writer(
 ) -> LiveWriter:
     """The writer of the stream; ``live`` are further arguments of ``LiveWriter``."""
     from mcz.files.live.writer import LiveWriter
-    from mcz.model.units import facing, in_unit
+    from mcz.model.units import in_unit, with_axes
 
-    skeleton = facing(in_unit(source.skeleton, unit), up)
+    skeleton = with_axes(in_unit(source.skeleton, unit), up)
     return LiveWriter(sink, skeleton, frame_rate=rate, **live)
 
 

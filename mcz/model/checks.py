@@ -161,12 +161,12 @@ def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
             raise TypeError
         if array.ndim != n_dimensions:
             raise ValueError
-        return plain(array)
+        return contiguous(array)
 
     return Rule(words, form)
 
 
-def plain(array: Items) -> Items:
+def contiguous(array: Items) -> Items:
     """``array`` in the byte order of the machine, aligned and in C order; itself if it is."""
     flags = array.flags
     if array.dtype.isnative and flags.c_contiguous and flags.aligned:

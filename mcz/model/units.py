@@ -45,7 +45,7 @@ def axes_of(skeleton: Skeleton) -> tuple[str, str, str]:
     return skeleton.up_axis, skeleton.forward_axis, skeleton.handedness
 
 
-def facing(
+def with_axes(
     skeleton: Skeleton, up: str | None, forward: str | None = None, handedness: str | None = None
 ) -> Skeleton:
     """``skeleton`` with these axes and handedness, unchanged for None; raises OptionError.

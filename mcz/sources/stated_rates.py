@@ -67,7 +67,7 @@ def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
     if match is None or not DECIMAL.fullmatch(match[1].decode("latin-1")):
         return None
     stated, _ = frame_rate(match[1].decode("latin-1"))
-    text = _like(match[1], 1 / rate, lambda text: _is_time_of(text, rate))
+    text = _decimal_like(match[1], 1 / rate, lambda text: _is_time_of(text, rate))
     parts[-1] = _replace_text(parts[-1], match.span(1), text or frame_time(rate).encode())
     return Restated(stated or NONE, build(replace(fields, header=parts), WHERE))
 
@@ -166,7 +166,7 @@ def _in_header(header: bytes, factor: Fraction) -> bytes:
         old = stated_rate(header[start:stop].decode("latin-1"))
         if old is not None:
             rate = old * factor
-            text = _like(header[start:stop], rate, _is_near(rate))
+            text = _decimal_like(header[start:stop], rate, _is_near(rate))
             header = _replace_text(header, (start, stop), text)
     return header
 
@@ -190,7 +190,7 @@ def _scale_clock(clock: Clock, factor: Fraction) -> ClockFields | None:
     return ClockFields(grid=grid, numerator=numerator, denominator=denominator, offset=offset)
 
 
-def _like(old: bytes, number: Fraction, means_it: Callable[[str], bool]) -> bytes:
+def _decimal_like(old: bytes, number: Fraction, means_it: Callable[[str], bool]) -> bytes:
     """``number`` with the decimals of ``old``, or more if it takes more; b"": none will do."""
     places = len(old.partition(b".")[2]) if re.fullmatch(rb"[0-9]*\.?[0-9]*", old) else 0
     texts = (f"{float(number):.{digits}f}" for digits in range(places, MOST_DECIMALS))

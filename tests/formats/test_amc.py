@@ -10,7 +10,7 @@ import pytest
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources.text import amc, asf
-from mcz.sources.text.bones import derive
+from mcz.sources.text.bones import derive_skeleton
 from tests.formats.text_files import AMC, ASF
 
 SKELETON = asf.read(ASF)
@@ -66,7 +66,7 @@ def test_other_channels_than_the_asf_derive_a_skeleton() -> None:
     data = AMC.replace(b"toe -0.5\n", b"toe 1 2 3\nhat 4 5\n").replace(b"toe -0.25", b"toe 1 2 3")
     motion = amc.read(data, "walk", SKELETON)
     assert motion.skeleton.base == b""
-    assert motion.skeleton == derive(SKELETON, {"root": 6, "toe": 3, "hat": 2, "back": 3})
+    assert motion.skeleton == derive_skeleton(SKELETON, {"root": 6, "toe": 3, "hat": 2, "back": 3})
     toe, hat = motion.skeleton.joints[2:]
     assert [c.kind for c in toe.channels] == ["rx", "ry", "rz"]
     assert (hat.name, hat.parent, [c.label for c in hat.channels]) == ("hat", -1, ["1", "2"])

@@ -19,7 +19,7 @@ from mcz import Channel, LimitError, Motion, MotionError, SourceError
 from mcz.model.numbers import GridKind, scan
 from mcz.sources import FORMATS
 from mcz.sources.sample import bvh_walk, marker_walk
-from mcz.sources.tables.layout import PHRASES, fill
+from mcz.sources.tables.layout import PHRASES, fill_marks
 from mcz.sources.tables.times import find_clock, rate_of_times, stated_rate
 from tests.formats.tab_files import NUMBERS
 from tools.vectors.build.table_files import FORCES, MARKERS, QUATERNIONS, TIMES
@@ -111,9 +111,9 @@ def test_a_header_has_a_limit() -> None:
     longest = max(PHRASES.values(), key=len)
     mark = next(bytes((mark,)) for mark, phrase in PHRASES.items() if phrase == longest)
     n = 2**26 // len(longest)
-    assert len(fill(mark * n, [], b"")) == n * len(longest)
+    assert len(fill_marks(mark * n, [], b"")) == n * len(longest)
     with pytest.raises(LimitError, match="a header of"):
-        fill(mark * (n + 1), [], b"")
+        fill_marks(mark * (n + 1), [], b"")
 
 
 # Times

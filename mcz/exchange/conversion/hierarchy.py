@@ -49,13 +49,13 @@ def to_bvh(motion: Motion) -> Motion:
         numbers.append(len(joints))
         parent = numbers[joint.parent] if joint.parent >= 0 else -1
         channels, offset = [], joint.offset
-        if moves(skeleton, index):
+        if is_moving(skeleton, index):
             columns += list(_positions(skeleton, index, values))
             channels, offset = [Channel(kind) for kind in POSITION_KINDS], ORIGIN
         order, angles = _angles(skeleton, index, values)
         columns += list(angles.T)
         channels += [Channel(f"r{letter}") for letter in order]
-        stretched = stretches(joint)
+        stretched = is_stretching(joint)
         tails = loose_tails(skeleton, index)
         fixed = () if stretched else tails
         joints.append(Joint(joint.name, parent, offset, fixed, channels=tuple(channels)))
@@ -98,12 +98,12 @@ def _unmistakable(motion: Motion) -> Motion:
     plain = []
     for index, joint in enumerate(joints):
         offset = list(joint.offset)
-        moves = [
+        position_columns = [
             (POSITION_KINDS.index(channel.kind), column)
             for channel, column in zip(joint.channels, motion.skeleton.columns(index), strict=True)
             if channel.kind in POSITION_KINDS
         ]
-        for component, column in moves:
+        for component, column in position_columns:
             values[:, column] += offset[component] if joint.adds_to_offset else 0.0
             offset[component] = 0.0
         plain.append(replace(joint, offset=(offset[0], offset[1], offset[2]), adds_to_offset=True))
@@ -137,14 +137,14 @@ def _check(motion: Motion) -> None:
             )
 
 
-def moves(skeleton: Skeleton, index: int) -> bool:
+def is_moving(skeleton: Skeleton, index: int) -> bool:
     """Return True if the joint's position relative to its parent may change; always for a root."""
     joint = skeleton.joints[index]
     own = any(channel.kind in POSITION_KINDS for channel in joint.channels)
-    return joint.parent < 0 or own or stretches(skeleton.joints[joint.parent])
+    return joint.parent < 0 or own or is_stretching(skeleton.joints[joint.parent])
 
 
-def stretches(joint: Joint) -> bool:
+def is_stretching(joint: Joint) -> bool:
     """Return True if channels of the joint scale its descendants."""
     return any(channel.kind in STRETCHING for channel in joint.channels)
 
@@ -263,20 +263,20 @@ class _Bones:
             points = list(dict.fromkeys(ends))
             whole = points[0] if len(points) == 1 and joint.parent >= 0 else None
             parent = -1 if joint.parent < 0 else starts[joint.parent][offsets[index]]
-            own = self._turning(index, parent, whole or ORIGIN)
+            own = self._add_turning_bone(index, parent, whole or ORIGIN)
             starts[index] = {whole or ORIGIN: own}
             for number, point in enumerate((p for p in points if p not in starts[index]), 1):
-                starts[index][point] = self._leading(joint, own, point, number)
+                starts[index][point] = self._add_leading_bone(joint, own, point, number)
 
-    def _turning(self, index: int, parent: int, tail: Vector) -> int:
+    def _add_turning_bone(self, index: int, parent: int, tail: Vector) -> int:
         """Add the bone that turns as joint ``index`` does; return its number."""
         joint = self.skeleton.joints[index]
         columns = self.skeleton.columns(index)
         kinds = [channel.kind for channel in joint.channels]
-        moves = [k for k, kind in enumerate(kinds) if kind in POSITION_KINDS]
+        positions = [k for k, kind in enumerate(kinds) if kind in POSITION_KINDS]
         turns = [k for k, kind in enumerate(kinds) if kind in ROTATION_KINDS]
         # About turned axes from first to last is about fixed axes from last to first.
-        kept = [*(moves if parent < 0 else []), *reversed(turns)]
+        kept = [*(positions if parent < 0 else []), *reversed(turns)]
         self.columns += [columns[k] for k in kept]
         bone = Joint(
             "root" if parent < 0 else self._name(joint.name),
@@ -289,7 +289,7 @@ class _Bones:
         )
         return self._add(bone)
 
-    def _leading(self, joint: Joint, own: int, point: Vector, number: int) -> int:
+    def _add_leading_bone(self, joint: Joint, own: int, point: Vector, number: int) -> int:
         """Add a bone without channels from the joint to ``point``; returns its number."""
         name = self._name(f"{joint.name}_{number}")
         return self._add(Joint(name, own, self._end(own), (point,)))

@@ -22,7 +22,7 @@ from mcz.model.motion import Skeleton
 from mcz.model.skeleton import Joints, column_of, signs_of
 from mcz.model.text_format import among
 from mcz.model.types import Floats
-from mcz.model.units import facing
+from mcz.model.units import with_axes
 
 Make = Callable[[Subject, Rows], Floats]
 FORMS = {
@@ -283,7 +283,7 @@ def subject_of(
     """The parts of ``clip`` that these fields use; raises MotionError and OptionError."""
     skeleton = clip.skeleton
     if units.up and not skeleton.up_axis:
-        skeleton = facing(skeleton, units.up)
+        skeleton = with_axes(skeleton, units.up)
     timed = [each.name for each in fields if each.reach]
     if timed and not is_timed:
         raise OptionError(f"{', '.join(timed)}: a frame rate is needed; set it with source_rate=")

@@ -114,7 +114,7 @@ def label_of(member: Member, clip: Clip, by: str, pattern: str | None) -> str:
     return clip.metadata[by]
 
 
-def split(
+def split_members(
     labels: Sequence[str], weights: Sequence[int], parts: Mapping[str, float], seed: int
 ) -> dict[str, list[int]]:
     """The numbers of the items of each part; raises OptionError. See ``Dataset.split``."""

@@ -349,9 +349,11 @@ class Dataset:
         splits the same clips in the same way. Raises OptionError if a clip has none, and if
         there are fewer subjects than parts.
         """
-        from mcz.exchange.datasets.samplers import split
+        from mcz.exchange.datasets.samplers import split_members
 
-        groups = split(self._labels(by, pattern), list(map(self._count, self.members)), parts, seed)
+        groups = split_members(
+            self._labels(by, pattern), list(map(self._count, self.members)), parts, seed
+        )
         return {
             name: self.part([self.members[number] for number in numbers])
             for name, numbers in groups.items()

@@ -44,7 +44,7 @@ from mcz.files.reading.clip import Clip
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Skeleton
 from mcz.model.schema import parse
 from mcz.model.types import Params, Values
-from mcz.model.units import facing, in_unit
+from mcz.model.units import in_unit, with_axes
 
 if TYPE_CHECKING:
     from mcz.codecs.transforms.post_filter import PostFilter
@@ -192,7 +192,7 @@ def stream_encode(
     known = skeleton if isinstance(skeleton, Skeleton) else markers(skeleton)
     writer = LiveWriter(
         sink,
-        facing(in_unit(known, unit), up),
+        with_axes(in_unit(known, unit), up),
         codec,
         params,
         frame_rate=frame_rate,

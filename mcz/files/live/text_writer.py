@@ -15,7 +15,7 @@ from mcz.files.reading.source_files import SourceOptions, read_skeleton
 from mcz.files.writing.file import EncodingOptions, rate_notes
 from mcz.model.motion import Skeleton
 from mcz.model.types import Params
-from mcz.model.units import facing, in_unit
+from mcz.model.units import in_unit, with_axes
 from mcz.sources import FORMATS, likely_formats
 from mcz.sources.text.source import Arriving
 
@@ -76,7 +76,7 @@ def begin_live(
     metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
     writer = LiveWriter(
         sink,
-        facing(in_unit(arriving.skeleton, options.unit), *options.axes),
+        with_axes(in_unit(arriving.skeleton, options.unit), *options.axes),
         encoding.codec,
         encoding.params,
         frame_rate=arriving.frame_rate if options.rate is None else Fraction(options.rate),

@@ -10,7 +10,7 @@ from typing import Any
 
 from mcz.errors import MczError, OptionError, SourceError, reason_of
 from mcz.model.motion import Motion, Skeleton
-from mcz.model.units import facing, in_unit, unit_cm_of
+from mcz.model.units import in_unit, unit_cm_of, with_axes
 from mcz.sources import FORMATS, HEAD_BYTES, Format, format_of, has_known_suffix, likely_formats
 from mcz.sources.arrays.skeletons import kinds_of, with_kinds
 from mcz.sources.tables.motion_bids import MOTION_SUFFIX, with_side_files
@@ -129,13 +129,13 @@ class SourceOptions:
             parse_rate(self.rate)
         if self.unit is not None:
             unit_cm_of(self.unit)
-        facing(Skeleton(()), *self.axes)
+        with_axes(Skeleton(()), *self.axes)
         if self.arrays is not None:
             kinds_of(self.arrays)
 
     @property
     def axes(self) -> tuple[str | None, str | None, str | None]:
-        """The stated axes, as ``facing`` takes them."""
+        """The stated axes, as ``with_axes`` takes them."""
         return self.up, self.forward, self.handedness
 
     def applied_to(self, motion: Motion) -> Motion:
@@ -152,7 +152,7 @@ class SourceOptions:
         if self.unit is not None:
             motion = replace(motion, skeleton=in_unit(motion.skeleton, self.unit))
         if any(self.axes):
-            motion = replace(motion, skeleton=facing(motion.skeleton, *self.axes))
+            motion = replace(motion, skeleton=with_axes(motion.skeleton, *self.axes))
         return motion
 
     def completing(self, motion: Motion) -> Motion:

@@ -28,7 +28,7 @@ from mcz.kinematics.retargeting.joint_maps import (
 )
 from mcz.kinematics.retargeting.turns import (
     finite_frames,
-    inverse,
+    inverse_turns,
     local_turns,
     relative_turns,
     rest_turns,
@@ -134,11 +134,11 @@ class _Retargeted:
             there = self.pairs[above] if above >= 0 else -1
             turn = relative_turns(self.theirs, there, other, self.turns)
             turn = multiply_matrices(
-                multiply_matrices(inverse(self.rest[above]), turn), self.rest[joint]
+                multiply_matrices(inverse_turns(self.rest[above]), turn), self.rest[joint]
             )
             target = multiply_matrices(missed[above], turn)
             turned = set_local_turns(self.ours, joint, target, self.columns)
-            missed[joint] = _known(multiply_matrices(inverse(turned), target))
+            missed[joint] = _known(multiply_matrices(inverse_turns(turned), target))
         self.travel.set(self.columns, self.rest)
         return np.ascontiguousarray(self.columns.T)
 
@@ -249,7 +249,7 @@ class Travel:
                     ways[carrier] = self._way(joint, other)
             elif is_moving(self.target.joints[joint].channels):
                 step = self.scale * self._step(other)
-                ways[joint] = to_world(inverse(rest[above]), step)
+                ways[joint] = to_world(inverse_turns(rest[above]), step)
         for joint, way in ways.items():
             self._check(joint, way)
         for joint in range(self.target.n_joints):

@@ -18,7 +18,7 @@ from mcz.kinematics.retargeting.joint_maps import check_channels, computed_signa
 from mcz.kinematics.retargeting.turns import (
     fill_unknown,
     finite_frames,
-    inverse,
+    inverse_turns,
     local_turns,
     relative_turns,
     set_local_turns,
@@ -277,7 +277,7 @@ def _joint_placements(chain: Chain, values: Floats, above: Mapping[int, int]) ->
                 axes, own = pose.axes[parent], chain.turned[parent]
                 world = axes if own is None else multiply_matrices(axes, own.T[:, :, None])
                 step = place - pose.origins[parent]
-                place = multiply_matrices(inverse(world), step[:, None])[:, 0]
+                place = multiply_matrices(inverse_turns(world), step[:, None])[:, 0]
             places[joint][:, rows] = place
     return places
 

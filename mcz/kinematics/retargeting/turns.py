@@ -75,7 +75,7 @@ def fill_unknown(matrices: Floats, known: Bools) -> Floats:
     return matrices[:, :, np.where(last < 0, known.argmax(), last)]
 
 
-def inverse(turn: Floats) -> Floats:
+def inverse_turns(turn: Floats) -> Floats:
     """The inverse of rotation matrices, (3, 3, F)."""
     return np.swapaxes(turn, 0, 1)
 
@@ -92,7 +92,7 @@ def relative_turns(chain: Chain, reference: int, joint: int, turns: dict[int, Fl
         shared += 1
     result = IDENTITY
     for index in reversed(up[shared:]):
-        result = multiply_matrices(result, inverse(turns[index]))
+        result = multiply_matrices(result, inverse_turns(turns[index]))
     for index in down[shared:]:
         result = multiply_matrices(result, turns[index])
     return result

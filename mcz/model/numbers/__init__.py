@@ -9,7 +9,7 @@ magnitude index m >= 0, with a minus sign -1 - m. So -0 is the ordinal -1, and n
 exception only because of its sign.
 """
 
-from mcz.model.numbers.choose import bits_of, choose_grid, fit
+from mcz.model.numbers.choose import bits_of, choose_grid, fit_grid
 from mcz.model.numbers.grid import GRID, Grid, GridFields, printed_base
 from mcz.model.numbers.rules import GridFlag, GridKind
 from mcz.model.numbers.tokens import Texts, Tokens, scan, values_of_texts
@@ -25,7 +25,7 @@ __all__ = [
     "Tokens",
     "bits_of",
     "choose_grid",
-    "fit",
+    "fit_grid",
     "ordinals_of",
     "print_values",
     "printed_base",

@@ -44,7 +44,7 @@ Rule = tuple[GridKind, int, int, float, int]  # kind, digits, flags, scale, styl
 Candidate = tuple[float, Rule]  # bits of an ordinal, and the parameters of its grid
 
 
-def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
+def bits_with_exceptions(n_tokens: int, bits: float, n_exceptions: int) -> float:
     return bits * n_tokens + _EXCEPTION_BITS * n_exceptions
 
 
@@ -134,11 +134,11 @@ def _styles(counts: Sequence[int]) -> tuple[int, int, int]:
 
 
 def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
-    """The grid of ``fit``, for callers that need no ordinals."""
-    return fit(tokens, prefer)[0]
+    """The grid of ``fit_grid``, for callers that need no ordinals."""
+    return fit_grid(tokens, prefer)[0]
 
 
-def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]:
+def fit_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]:
     """The text grid that needs the fewest bytes for ``tokens``, exceptions included.
 
     Returned with the result of its ``ordinals_of_tokens``. The first of ``prefer`` without
@@ -160,11 +160,11 @@ def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]
     least = float("inf"), len(ranked)  # the lowest price, and the first candidate with it
     for rank in order:
         bits, rule = ranked[rank]
-        if (cost(len(tokens), bits, 0), rank) >= least:
+        if (bits_with_exceptions(len(tokens), bits, 0), rank) >= least:
             continue
-        tried = _try_rule(tokens, rule, least[0] - cost(len(tokens), bits, 0))
+        tried = _try_rule(tokens, rule, least[0] - bits_with_exceptions(len(tokens), bits, 0))
         misses = len(tokens) if tried is None else len(tokens) - int(np.count_nonzero(tried[1]))
-        price = cost(len(tokens), bits, misses), rank
+        price = bits_with_exceptions(len(tokens), bits, misses), rank
         if tried is not None and price < least:
             least, fewest, best = price, misses, (Grid(*rule), *tried)
     return next((fitted for fitted in preferred if np.count_nonzero(~fitted[2]) <= fewest), best)
@@ -176,7 +176,7 @@ def _likeliest_first(sample: Tokens, ranked: Sequence[Candidate]) -> list[int]:
     The others are then given up early. Only grids that are quick to try come first.
     """
     prices = [
-        cost(len(sample), bits, _fewest_misses(sample, rule))
+        bits_with_exceptions(len(sample), bits, _fewest_misses(sample, rule))
         if rule[0] in DECIMAL_KINDS
         else float("inf")
         for bits, rule in ranked

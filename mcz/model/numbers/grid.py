@@ -38,7 +38,7 @@ from mcz.model.numbers.text_grids import (
     token_ordinals32,
     uncertain_tokens,
 )
-from mcz.model.numbers.tokens import Texts, Tokens, nearest
+from mcz.model.numbers.tokens import Texts, Tokens, nearest_double
 from mcz.model.schema import FINITE, Adapted, Record
 from mcz.model.schema import field as record_field
 from mcz.model.types import Bools, Floats, Ints, Items, Values
@@ -66,7 +66,7 @@ class Grid:
         try:
             object.__setattr__(self, "kind", GridKind(self.kind))
             object.__setattr__(self, "flags", int(self.flags))
-            fault = rules.fault(self.kind, self.digits, self.flags, self.scale, self.style)
+            fault = rules.grid_fault(self.kind, self.digits, self.flags, self.scale, self.style)
         except (TypeError, ValueError) as error:
             raise OptionError(f"a grid of {self.kind!r}: {error}") from None
         if fault:
@@ -114,7 +114,7 @@ class Grid:
             case GridKind.FIXED | GridKind.TRIMMED:
                 values = np.divide(magnitudes, TENS[self.digits])  # GRID-08
             case GridKind.GENERAL:
-                values = nearest(*general_split(magnitudes, self.digits))
+                values = nearest_double(*general_split(magnitudes, self.digits))
             case GridKind.TEXT64 | GridKind.BINARY64:
                 values = binary64_values(magnitudes)
             case GridKind.TEXT32:

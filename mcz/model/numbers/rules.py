@@ -88,7 +88,7 @@ _LIMITS = {
 }
 
 
-def fault(kind: GridKind, digits: int, flags: int, scale: float, style: int = 0) -> str | None:
+def grid_fault(kind: GridKind, digits: int, flags: int, scale: float, style: int = 0) -> str | None:
     """Return the fault of a grid, or None."""
     allowed, known = _ALLOWED.get(kind, ((0,), 0))
     if digits not in allowed:  # GRID-02

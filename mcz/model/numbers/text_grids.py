@@ -32,7 +32,7 @@ from mcz.model.numbers.rules import (
     limit,
     scaled_magnitudes,
 )
-from mcz.model.numbers.tokens import Texts, Tokens, nearest, scan_texts
+from mcz.model.numbers.tokens import Texts, Tokens, nearest_double, scan_texts
 from mcz.model.types import Bools, Floats, Ints
 
 _UNLIMITED = 1_000_000  # more decimals, and a larger exponent, than any number has
@@ -162,7 +162,7 @@ def base_values(digits: int, magnitudes: Ints) -> Floats:
     if digits == BASE_64:
         return magnitudes.view(np.float64)
     if digits > BASE_GENERAL:
-        return nearest(*general_split(magnitudes, digits - BASE_GENERAL))
+        return nearest_double(*general_split(magnitudes, digits - BASE_GENERAL))
     result: Floats = np.divide(magnitudes, TENS[digits])
     return result
 

@@ -1,6 +1,6 @@
 """Numbers in text: their place, their notation, their binary64.
 
-SPEC.md, "Decimal and binary64", is normative for ``nearest``.
+SPEC.md, "Decimal and binary64", is normative for ``nearest_double``.
 """
 
 from __future__ import annotations
@@ -186,16 +186,16 @@ def _value(text: bytes, fallback: float | None = None) -> float:
     return float(text) if fallback is None else fallback
 
 
-def nearest(mantissa: Ints, power: Ints) -> Floats:
+def nearest_double(mantissa: Ints, power: Ints) -> Floats:
     """The binary64 nearest to ``mantissa * 10^power``, mantissa >= 0; ties to even."""
-    out, slow = scale(mantissa, power)
+    out, slow = scaled_double(mantissa, power)
     if slow.any():
         pairs = zip(mantissa[slow].tolist(), power[slow].tolist(), strict=True)
         out[slow] = [float(f"{m}e{p}") for m, p in pairs]
     return out
 
 
-def scale(mantissa: Ints, power: Ints) -> tuple[Floats, Bools]:
+def scaled_double(mantissa: Ints, power: Ints) -> tuple[Floats, Bools]:
     """``mantissa * 10^power`` in binary64, and a mask of results that may not be the nearest.
 
     One product or quotient of two exact factors is correctly rounded: they are exact if the

@@ -157,7 +157,7 @@ def has_rows(data: bytes) -> bool:
     return _type_of(items[b"descr"])[1] in TYPES and len(_NUMBER.findall(items[b"shape"][1])) > 1
 
 
-def refuse_odd(head: Head) -> None:
+def refuse_faulty_head(head: Head) -> None:
     """Raise SourceError if a head has a fault."""
     if head.odd:
         raise SourceError(head.odd)
@@ -214,7 +214,7 @@ def file_columns(head: Head) -> NDArray[np.int64]:
     return columns.ravel(order="F" if head.by_columns else "C")
 
 
-def unfit(words: Items) -> str:
+def misfit_reason(words: Items) -> str:
     """Reason why no grid stores such numbers bit for bit, or ""."""
     kind, size = words.dtype.kind, words.dtype.itemsize
     if kind == "b":
@@ -233,7 +233,7 @@ def unfit(words: Items) -> str:
 
 
 def columns_of(words: Items) -> Columns:
-    """The columns of numbers (rows, columns) that are not ``unfit``."""
+    """The columns of numbers (rows, columns), which grids store bit for bit."""
     if words.dtype.kind != "f":
         return Columns(words.astype(np.int64), (INTEGER,) * words.shape[1])
     with np.errstate(invalid="ignore"):  # of NaNs that signal
@@ -365,7 +365,7 @@ class Array:
 def npy_array(data: bytes) -> Array:
     """The array of an NPY file; raises SourceError if it has no numbers with rows."""
     head = read_head(data, 0, len(data))
-    refuse_odd(head)
+    refuse_faulty_head(head)
     array = array_of("array", data, head, len(data))
     if array.kept:
         raise SourceError(f"the array is {array.kept}, which is no motion", offset=head.start)
@@ -407,5 +407,5 @@ def array_of(name: str, data: bytes, head: Head, stop: int) -> Array:
     if not head.shape:
         return Array(name, head, stop, "a single number", words_of(data, head))
     words = words_of(data, head)
-    fault = unfit(words)
+    fault = misfit_reason(words)
     return Array(name, head, stop, fault, words, is_loud=bool(fault))

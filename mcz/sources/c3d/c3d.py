@@ -33,9 +33,9 @@ from mcz.sources.c3d.parameters import (
     output_channels,
     parse_parameters,
 )
-from mcz.sources.c3d.plain import plain
+from mcz.sources.c3d.plain import plain_c3d
 from mcz.sources.c3d.recording import is_unsigned, recording_of
-from mcz.sources.c3d.restore import restore
+from mcz.sources.c3d.restore import restore_c3d
 from mcz.sources.c3d.shape import ROTATION_WORDS, WORD_OF_FIRST, WORD_OF_LAST, Shape, find_shape
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54}
@@ -276,9 +276,9 @@ def _source(data: bytes, layout: Layout) -> Source:
 def write(motion: Motion) -> bytes:
     """The C3D file of ``motion``: its own source with its values, or a plain one.
 
-    Raises MotionError for what C3D cannot say; see ``plain``.
+    Raises MotionError for what C3D cannot say; see ``plain_c3d``.
     """
     if motion.source is None or motion.source.format not in (FORMAT, OUTPUTS_FORMAT):
-        motion = plain(motion)
+        motion = plain_c3d(motion)
     assert motion.source is not None
-    return restore(motion, motion.source)
+    return restore_c3d(motion, motion.source)

@@ -41,7 +41,7 @@ FLOATS = Grid(GridKind.BINARY32)
 MOST_RATE = 1e30  # of frames: the samples of one second fit a binary32, too
 
 
-def plain(motion: Motion) -> Motion:
+def plain_c3d(motion: Motion) -> Motion:
     """``motion`` on the grids of a C3D file, with the source of a plain one.
 
     Outputs of models follow the points. Raises MotionError for joints that are no markers, signals

@@ -23,7 +23,7 @@ from mcz.sources.c3d.shape import COUNTED, ROTATION_WORDS
 INTEGERS = (GridKind.SCALED, GridKind.INTEGER)
 
 
-def restore(motion: Motion, source: Source) -> bytes:
+def restore_c3d(motion: Motion, source: Source) -> bytes:
     """The bytes that ``source`` and the signals of ``motion`` make.
 
     A value that its grid does not have is written as the nearest that a word can hold. Raises

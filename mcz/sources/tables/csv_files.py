@@ -31,12 +31,12 @@ from mcz.sources.tables.csv_text import (
 from mcz.sources.tables.layout import UNIT_CM
 from mcz.sources.tables.motive import HEAD, read_motive
 from mcz.sources.tables.restore import restore_table
-from mcz.sources.tables.rows import TableRows, lines_from, read_table, without_zeros
+from mcz.sources.tables.rows import TableRows, lines_from, move_zeros_to_gaps, read_table
 from mcz.sources.tables.signals import read_columns, read_text, table_metadata, text_note
 from mcz.sources.tables.times import Times, read_times
 from mcz.sources.tables.vicon import AXIS, read_vicon
 from mcz.sources.text.layout import FRAME_NUMBER
-from mcz.sources.text.rows import Rows, counted_up, line_of
+from mcz.sources.text.rows import Rows, line_of, number_frames
 from mcz.sources.text.source import (
     BOM,
     check_text,
@@ -180,7 +180,9 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
         raise SourceError("there is no column of numbers besides the times", line=1)
     at = len(values) + sum(text.n_numbers for text in table.texts)
     timed = time is not None and time not in text_cells
-    rows = without_zeros(data, counted_up(table.rows), (range(len(values)), [at] if timed else []))
+    rows = move_zeros_to_gaps(
+        data, number_frames(table.rows), (range(len(values)), [at] if timed else [])
+    )
     times = Times(None, (), None, True)
     if time is not None and timed:
         label = head.names[time].strip()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from mcz.errors import SourceError
 from mcz.model.text_format import quote
-from mcz.sources.text.source import BOM, MOST_CHANNELS, check
+from mcz.sources.text.source import BOM, MOST_CHANNELS, check_count
 
 SEPARATORS: tuple[bytes | None, ...] = (b",", b";", b"\t", None)  # None: blanks
 # words for a number that is not there, those of spreadsheets among them
@@ -36,7 +36,7 @@ def cells_of(line: bytes, separator: bytes | None) -> list[bytes]:
     """The cells of a line, without blanks and quotes around them; SourceError for too many."""
     line = line.removeprefix(BOM).rstrip(b"\r\n")
     n = len(line) // 2 if separator is None else line.count(separator)
-    check("cells in a line", n, MOST_CELLS)
+    check_count("cells in a line", n, MOST_CELLS)
     if separator is None:
         return line.split()
     if b'"' not in line:

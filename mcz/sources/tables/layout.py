@@ -231,7 +231,7 @@ def parsed_clock(shared: SectionFields) -> Clock | None:
     return Clock(fields.grid, fields.numerator, fields.denominator, fields.offset)
 
 
-def fill(header: bytes, names: Sequence[str], count: bytes) -> bytes:
+def fill_marks(header: bytes, names: Sequence[str], count: bytes) -> bytes:
     """``header`` with its marks replaced; FormatError if there are more than joints."""
     out, at, size = [], 0, len(header)
     joint = number = 0

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from mcz.errors import SourceError
 from mcz.model.motion import Channel, Joint, Motion, Skeleton
 from mcz.sources.tables.csv_text import count_columns, is_blank, texts_of, whole_cells
-from mcz.sources.tables.rows import begins_with_number, lines_from, read_table, without_zeros
+from mcz.sources.tables.rows import begins_with_number, lines_from, move_zeros_to_gaps, read_table
 from mcz.sources.tables.signals import read_columns, read_text, table_metadata, text_note
 from mcz.sources.tables.times import Times, read_times, stated_rate
 from mcz.sources.text.layout import FRAME_NUMBER
-from mcz.sources.text.rows import counted_up, line_of
+from mcz.sources.text.rows import line_of, number_frames
 from mcz.sources.text.source import (
     BOM,
     named_count,
@@ -94,8 +94,8 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     objects = _without(objects, texts)
     n_values = sum(len(motion.columns) for motion in objects)
     time = n_values + sum(text.n_numbers for text in table.texts)
-    rows = without_zeros(
-        data, counted_up(table.rows), (range(time, table.rows.start.shape[1]), range(n_values))
+    rows = move_zeros_to_gaps(
+        data, number_frames(table.rows), (range(time, table.rows.start.shape[1]), range(n_values))
     )
     stated = [
         rate

@@ -33,20 +33,20 @@ from mcz.sources.tables.mvnx_frames import (
     unit_of,
 )
 from mcz.sources.tables.restore import restore_table
-from mcz.sources.tables.rows import followed_by
+from mcz.sources.tables.rows import append_rest
 from mcz.sources.tables.signals import (
-    of_columns,
     read_columns,
     read_signal,
     read_text,
+    select_columns,
     table_metadata,
 )
 from mcz.sources.tables.text_columns import TextColumn, odd_cells, split_text
 from mcz.sources.tables.times import Times, read_times, stated_rate
-from mcz.sources.text.rows import Rows, counted_up, line_of
+from mcz.sources.text.rows import Rows, line_of, number_frames
 from mcz.sources.text.source import (
     MOST_JOINTS,
-    check,
+    check_count,
     check_text,
     names_in,
     section_of,
@@ -204,7 +204,7 @@ class _Reader:
         if path and path[-1] in LISTS:
             labels = header.labels.setdefault(path[-1], [])
             labels.append(_printable(label))
-            check(path[-1], len(labels), MOST_JOINTS)
+            check_count(path[-1], len(labels), MOST_JOINTS)
         elif name == "subject":
             header.subject = attributes
         elif name == "mvn":
@@ -274,7 +274,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
         raise SourceError("the file is truncated in its first frame", line=line_of(data, at))
     body, rest = data[:stop], data[stop:]
     rows, columns = read_frames(body, at)
-    rows = counted_up(followed_by(rows, rest))
+    rows = number_frames(append_rest(rows, rest))
     rows, texts = _split_text(data, rows, columns)
     joints, odd = _joints(header, columns)
     more = [*_elements(data, rows, header, columns), *_attributes(data, rows, columns, texts)]
@@ -317,7 +317,7 @@ def write(motion: Motion) -> bytes:
 
 
 def _signal(data: bytes, rows: Rows, columns: Sequence[int]) -> Signal:
-    return read_signal(data, of_columns(rows, columns))
+    return read_signal(data, select_columns(rows, columns))
 
 
 def _joints(header: Header, columns: FrameColumns) -> tuple[tuple[Joint, ...], list[str]]:
@@ -367,7 +367,7 @@ def _split_text(
 ) -> tuple[Rows, dict[int, TextColumn]]:
     """``rows`` with numbers in place of attributes that are text, and these by their column."""
     places = [columns.column(name) for name in columns.attributes]
-    text_cells = odd_cells(data, of_columns(rows, places)).text_columns() if places else []
+    text_cells = odd_cells(data, select_columns(rows, places)).text_columns() if places else []
     chosen = [places[k] for k in text_cells]
     if not chosen:
         return rows, {}

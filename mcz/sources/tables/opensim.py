@@ -21,7 +21,7 @@ from mcz.model.numbers import scan
 from mcz.sources.tables.csv_text import check_points
 from mcz.sources.tables.layout import NEXT, SAME, UNIT_CM
 from mcz.sources.tables.restore import plain_storage, plain_trc, restore_table
-from mcz.sources.tables.rows import begins_with_number, lines_from, read_table, without_zeros
+from mcz.sources.tables.rows import begins_with_number, lines_from, move_zeros_to_gaps, read_table
 from mcz.sources.tables.signals import read_columns, table_metadata
 from mcz.sources.tables.times import (
     Times,
@@ -32,7 +32,7 @@ from mcz.sources.tables.times import (
     stated_rate,
 )
 from mcz.sources.text.layout import FRAME_NUMBER
-from mcz.sources.text.rows import Rows, counted_up, line_of
+from mcz.sources.text.rows import Rows, line_of, number_frames
 from mcz.sources.text.source import (
     check_text,
     named_count,
@@ -74,7 +74,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     columns = [[FRAME_NUMBER], [time], *([c] for c in range(time))]
     separator = b"\t" if b"\t" in data[header.rows :].partition(b"\n")[0] else None
     table = read_table(data, header.rows, time + 1, columns, separator)
-    rows = without_zeros(data, counted_up(table.rows), ([time], range(time)))
+    rows = move_zeros_to_gaps(data, number_frames(table.rows), ([time], range(time)))
     markers = read_columns(data, rows, range(time))
     joints = tuple(Joint(marker, channels=POSITION) for marker in names)
     unit_cm = UNIT_CM.get(header.values.get("units", "").lower())
@@ -217,7 +217,7 @@ def read_storage(data: bytes, name: str = "motion", *, format_name: str) -> Moti
     time = starts[-1]
     columns = [list(range(a, a + n)) for a, n in zip(starts, sizes, strict=False)]
     table = read_table(data, header.rows, time + 1, [[time], *columns], separator)
-    rows = without_zeros(data, table.rows, ([time], range(time)))
+    rows = move_zeros_to_gaps(data, table.rows, ([time], range(time)))
     motion = read_columns(data, rows, range(time))
     read = read_columns(data, rows, [time])
     clock, odd = as_times(read, Channel("", label, "s"))

@@ -20,7 +20,7 @@ from mcz.model.motion import POSITION_KINDS, Channel, Exceptions, Motion, Signal
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Ints
 from mcz.sources.restore import printed_count, text_limit, write_rows
-from mcz.sources.tables.layout import Clock, Section, build_table, fill, parse_sections
+from mcz.sources.tables.layout import Clock, Section, build_table, fill_marks, parse_sections
 from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.sources.text.source import TableNotes
 
@@ -50,7 +50,7 @@ def restore_table(motion: Motion) -> bytes:
         mine = notes.of(k, table.samples_per_frame, table.n_rows)
         header = section.header
         if section.marked:
-            header = fill(header, names, printed_count(section.rows, table.n_rows))
+            header = fill_marks(header, names, printed_count(section.rows, table.n_rows))
         out.write(header)
         begin = out.tell()
         write_rows(out, table, section.rows, mine, numbers, limit, section.missing)

@@ -186,7 +186,7 @@ def read_table(
     if missing:
         gone = blank | _are(data, rows, missing)
         gone[:, texts] = False
-    rows = followed_by(_without(rows, gone), whole[len(data) :])
+    rows = append_rest(_without(rows, gone), whole[len(data) :])
     if not texts or numbers_at is None:
         return TableRows(rows, missing)
     cell_numbers = {column: list(columns).index([column]) + 1 for column in texts}
@@ -194,7 +194,7 @@ def read_table(
     return TableRows(rows, missing, tuple(text_columns))
 
 
-def followed_by(rows: Rows, rest: bytes) -> Rows:
+def append_rest(rows: Rows, rest: bytes) -> Rows:
     """``rows`` with what follows the last one."""
     ending = rows.patterns[last_pattern(rows)].tail if rows.ending is None else rows.ending
     return replace(rows, ending=ending + rest) if rest else rows
@@ -237,7 +237,7 @@ def _without(rows: Rows, gone: Bools) -> Rows:
     return replace(rows, start=rows.start * keep, stop=rows.stop * keep)
 
 
-def without_zeros(data: bytes, rows: Rows, groups: Sequence[Sequence[int]]) -> Rows:
+def move_zeros_to_gaps(data: bytes, rows: Rows, groups: Sequence[Sequence[int]]) -> Rows:
     """``rows`` with the zeros that end every number of a group of columns moved to the gaps.
 
     ``%.6f`` of what has 3 decimals prints three zeros that say nothing.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import OptionError, SourceError
 from mcz.model.motion import Channel, Exceptions, Signal
-from mcz.model.numbers import Grid, GridFlag, GridKind, Tokens, bits_of, fit, scan
+from mcz.model.numbers import Grid, GridFlag, GridKind, Tokens, bits_of, fit_grid, scan
 from mcz.model.text_format import quote
 from mcz.sources.tables.text_columns import TextColumn
 from mcz.sources.text.rows import Rows, line_of
@@ -55,7 +55,7 @@ def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
     values = numbers.reshape(shape) if dense else np.zeros(shape)
     if not dense:
         values[mask] = numbers
-        _hold(values, mask)
+        _hold_values(values, mask)
     grids, changes, printed = _grids(tokens, mask, n_each)
     odd = np.flatnonzero(~printed)
     cells = np.arange(mask.size)[chosen][odd] if len(odd) else odd
@@ -71,7 +71,7 @@ def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
     )
 
 
-def _hold(values: NDArray[np.float64], mask: Bools) -> None:
+def _hold_values(values: NDArray[np.float64], mask: Bools) -> None:
     """Put the value of the row before beneath every False of the mask."""
     rows = np.where(mask, np.arange(len(mask))[:, None], 0)
     values[:] = np.take_along_axis(values, np.maximum.accumulate(rows, axis=0), axis=0)
@@ -85,11 +85,11 @@ def _grids(
     ``mask``: which cells (rows, columns) have a token.
     """
     n_columns = mask.shape[1]
-    common, _, printed = fit(tokens)
+    common, _, printed = fit_grid(tokens)
     if printed.all():
         return (common,) * n_columns, (), printed
     places = _by_column(mask)
-    own = {c: fit(tokens[places[c][0]])[::2] for c in _doubtful(tokens, mask, common, printed)}
+    own = {c: fit_grid(tokens[places[c][0]])[::2] for c in _doubtful(tokens, mask, common, printed)}
     common, printed = _common_grid(tokens, [grid for grid, _ in own.values()], common, printed)
     grids, changes = [common] * n_columns, []
     for c, (grid, mine_printed) in own.items():
@@ -160,7 +160,7 @@ def _by_blocks(
     for start, stop in pairwise(edges):
         block = slice(start, stop)
         usual = grid.ordinals_of_tokens(tokens[block])[1]
-        best, _, better = fit(tokens[block])
+        best, _, better = fit_grid(tokens[block])
         if np.count_nonzero(better) >= np.count_nonzero(usual) + WORTH:
             changes.append((int(row[start]) // n_each * n_each, best))
             grid, usual = best, better
@@ -176,7 +176,7 @@ _TEXT_NOTE = re.compile(r"(?:^|; )[0-9]+ columns? (?:is|are) text: ([^;]*)")
 MOST_TRIED = 2048  # columns; of more each may take long, and has little to gain
 
 
-def of_columns(rows: Rows, columns: Sequence[int]) -> Rows:
+def select_columns(rows: Rows, columns: Sequence[int]) -> Rows:
     """``rows`` with these columns alone; their layout is not theirs any more."""
     chosen = list(columns)
     start, stop = rows.start[:, chosen], rows.stop[:, chosen]
@@ -185,7 +185,7 @@ def of_columns(rows: Rows, columns: Sequence[int]) -> Rows:
 
 def read_columns(data: bytes, rows: Rows, columns: Sequence[int], n_each: int = 1) -> Signal:
     """The signal of these columns, ``n_each`` rows a frame; SourceError for what is no number."""
-    rows = of_columns(rows, columns)
+    rows = select_columns(rows, columns)
     signal = read_signal(data, rows, n_each)
     tried = range(min(len(columns), MOST_TRIED))
     better_columns = {c: better for c in tried if (better := _better(data, rows, signal, c))}
@@ -271,7 +271,7 @@ def _better(
     tokens.known.append(values)
     if not len(values) or (values == values[0]).all():
         return None  # a constant costs nothing
-    grid, _, known = fit(tokens)
+    grid, _, known = fit_grid(tokens)
     n_odd = int(np.count_nonzero(signal.exceptions.channels == column))
     now = bits_of(signal.grids[column]) * len(tokens) + EXCEPTION_BITS * n_odd
     odd = np.flatnonzero(~known)

@@ -21,7 +21,7 @@ from mcz.model.numbers import scan
 from mcz.model.types import Bools, Ints
 from mcz.sources.tables.csv_text import DECIMAL_COMMA, NO_NUMBER, check_points
 from mcz.sources.text.layout import MAX_PATTERNS, Pattern, RowNotes, runs_of
-from mcz.sources.text.rows import DENSE, FEW_CELLS, Rows, line_of, padding
+from mcz.sources.text.rows import DENSE, FEW_CELLS, Rows, blanks_beside, line_of
 
 # A column of few texts is stored whole if they seldom change, or if many rows share each.
 FEW_TEXTS = 16
@@ -191,7 +191,7 @@ def _merge_columns(
             if shape is None:
                 items.append((gap, place.get(column, column), run.width))
                 continue
-            pad = b" " * padding(shape.padded, run.width) if run.width else b""
+            pad = b" " * blanks_beside(shape.padded, run.width) if run.width else b""
             gap += pad if run.width > 0 else b""
             for literal, number in zip(shape.literals, shape.columns, strict=False):
                 items.append((gap + literal, first + number, 0))

@@ -21,15 +21,15 @@ from mcz.sources.tables.csv_text import count_columns, texts_of
 from mcz.sources.tables.layout import MAX_SECTIONS, UNIT_CM, Section
 from mcz.sources.tables.rows import (
     TableRows,
+    append_rest,
     begins_with_number,
-    followed_by,
+    move_zeros_to_gaps,
     read_table,
-    without_zeros,
 )
 from mcz.sources.tables.signals import TEXT, read_columns, read_text, table_metadata, text_note
 from mcz.sources.tables.times import stated_rate
 from mcz.sources.text.layout import FRAME_NUMBER
-from mcz.sources.text.rows import Rows, counted_up, line_of
+from mcz.sources.text.rows import Rows, line_of, number_frames
 from mcz.sources.text.source import names_in, section_of, table_source, text_encoding
 
 Ints = NDArray[np.int64]
@@ -88,7 +88,7 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
     encoding = text_encoding(data)
     parts = _parts(data, encoding)
     parts_read = [_read(data, part) for part in parts]
-    parts_read[-1].rows = followed_by(parts_read[-1].rows, data[parts[-1].stop :])
+    parts_read[-1].rows = append_rest(parts_read[-1].rows, data[parts[-1].stop :])
     first = _motion_of(parts_read)
     rated = parts_read[first or 0]
     numbers = rated.numbers[:: rated.n_each]
@@ -182,7 +182,7 @@ def _read(data: bytes, part: _Part) -> _Read:
     table = read_table(data[: part.stop], part.rows, n + 1, cells, part.separator, numbers_at=n)
     part = _without(part, [text.column for text in table.texts])
     n = table.rows.start.shape[1] - 1
-    rows = without_zeros(data, table.rows, (range(part.n_columns),))
+    rows = move_zeros_to_gaps(data, table.rows, (range(part.n_columns),))
     numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
     steps = np.flatnonzero(np.diff(numbers))
     n_each = int(steps[0]) + 1 if len(steps) else rows.n_rows
@@ -195,7 +195,7 @@ def _read(data: bytes, part: _Part) -> _Read:
             "every frame",
             line=line_of(data, part.rows),
         )
-    rows = counted_up(rows, n_each)
+    rows = number_frames(rows, n_each)
     numbers = rows.numbers if rows.numbers is not None else np.arange(rows.n_rows) // n_each + 1
     tokens = scan(data, rows.start[:, n], rows.stop[:, n])
     texts = [b"%d" % k for k in range(n_each)]

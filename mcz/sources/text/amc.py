@@ -19,9 +19,9 @@ from mcz.model.motion import Motion, Skeleton, Source
 from mcz.model.text_format import quote
 from mcz.sources.restore import restore
 from mcz.sources.tables.signals import read_signal
-from mcz.sources.text.bones import fit, flat, match_bones, match_names
+from mcz.sources.text.bones import fit_skeleton, flat_skeleton, match_bones, match_names
 from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, RowNotes, runs_of
-from mcz.sources.text.rows import Rows, Token, counted_up, line_of, read_rows, tail_end
+from mcz.sources.text.rows import Rows, Token, line_of, number_frames, read_rows, tail_end
 from mcz.sources.text.source import (
     Arriving,
     Frame,
@@ -88,11 +88,11 @@ def _read_frames(
         raise SourceError("two bones have the same name")
     unit = _unit(data[:begin])
     if skeleton is None:
-        fitted, columns = flat(counts, unit)
+        fitted, columns = flat_skeleton(counts, unit)
     else:
-        fitted, columns = fit(skeleton, counts, unit)
+        fitted, columns = fit_skeleton(skeleton, counts, unit)
     frames.columns = {bone: columns[bone.decode(encoding)] for bone in frames.counts}
-    return fitted, counted_up(read_rows(data, begin, fitted.n_channels, frames))
+    return fitted, number_frames(read_rows(data, begin, fitted.n_channels, frames))
 
 
 def _unit(header: bytes) -> str:
@@ -266,7 +266,7 @@ class _ArrivingFrames:
                 raise self.source.error(
                     f"the skeleton has none of the bones: {' '.join(lacking.lacking[:8])[:200]}"
                 )
-            self.skeleton, self._columns = fit(self.skeleton, self._counts, self._unit)
+            self.skeleton, self._columns = fit_skeleton(self.skeleton, self._counts, self._unit)
         row = np.full(self.skeleton.n_channels, np.nan)
         values = self.source.numbers([text for texts in bones.values() for text in texts])
         at = 0

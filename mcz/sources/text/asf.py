@@ -12,7 +12,13 @@ from math import isfinite, sqrt
 
 from mcz.errors import FormatError, MotionError, SourceError
 from mcz.model.motion import ORIGIN, Channel, Joint, Skeleton, Source, Vector
-from mcz.sources.text.source import MOST_JOINTS, check, check_first_line, check_text, text_encoding
+from mcz.sources.text.source import (
+    MOST_JOINTS,
+    check_count,
+    check_first_line,
+    check_text,
+    text_encoding,
+)
 
 
 def read(data: bytes, name: str = "skeleton") -> Skeleton:
@@ -214,7 +220,7 @@ class _Reader:
             if not bone.name or bone.name in self.bones or bone.name == "root":
                 raise SourceError(f"a bone needs a unique name, not {bone.name!r}")
             self.bones[bone.name] = bone
-            check("bones", len(self.bones), MOST_JOINTS - 1)
+            check_count("bones", len(self.bones), MOST_JOINTS - 1)
             self.bone = None
         elif key == "name":
             bone.name = words[1] if len(words) > 1 else ""

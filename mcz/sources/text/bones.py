@@ -44,20 +44,22 @@ def match_bones(skeleton: Skeleton, counts: Mapping[str, int]) -> Match:
     )
 
 
-def flat(counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]:
+def flat_skeleton(counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]:
     """The skeleton of bones of which only the names and numbers of values are known."""
     joints = [Joint(name, channels=_scalars(count)) for name, count in counts.items()]
     skeleton = Skeleton(tuple(joints), "", angle_unit=angle_unit, intrinsic=False)
     return skeleton, _columns(skeleton, {name: name for name in counts})
 
 
-def fit(skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]:
+def fit_skeleton(
+    skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str
+) -> tuple[Skeleton, Columns]:
     """``skeleton``, or one derived from it if its channels are not those of the bones."""
     names = match_names(skeleton, counts)
     channels: dict[str | None, int] = {j.name: len(j.channels) for j in skeleton.joints}
     fits = all(channels.get(names[bone]) == count for bone, count in counts.items())
     if not fits or angle_unit != skeleton.angle_unit:
-        skeleton = derive(skeleton, counts, angle_unit)
+        skeleton = derive_skeleton(skeleton, counts, angle_unit)
         names = match_names(skeleton, counts)
     return skeleton, _columns(skeleton, names)
 
@@ -77,7 +79,9 @@ def match_names(skeleton: Skeleton, bones: Mapping[str, int]) -> dict[str, str |
     return result
 
 
-def derive(skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str = "") -> Skeleton:
+def derive_skeleton(
+    skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str = ""
+) -> Skeleton:
     """``skeleton`` with the channels that the bones of an AMC file have; ``base`` is b"".
 
     A joint whose number of values differs has rx ry rz if there are 3, else plain scalars; a root

@@ -18,7 +18,7 @@ from mcz.errors import MotionError, SourceError
 from mcz.model.motion import ORIGIN, Channel, Joint, Skeleton, Vector
 from mcz.model.text_format import quote
 from mcz.sources.text.rows import line_of
-from mcz.sources.text.source import MOST_CHANNELS, MOST_DEPTH, MOST_JOINTS, check, text_start
+from mcz.sources.text.source import MOST_CHANNELS, MOST_DEPTH, MOST_JOINTS, check_count, text_start
 
 _KINDS = {"position": "t", "rotation": "r", "scale": "s"}
 _NAMES = {f"{k}{a}": f"{a.upper()}{name}" for name, k in _KINDS.items() for a in "xyz"}
@@ -71,7 +71,7 @@ class _Reader:
     def check(self, what: str, number: int, most: int) -> None:
         """Raise SourceError, with the number of the line, for more than there may be."""
         try:
-            check(what, number, most)
+            check_count(what, number, most)
         except SourceError as error:
             error.add(line=line_of(self.data, self.at))
             raise

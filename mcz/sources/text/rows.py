@@ -74,7 +74,7 @@ class Rows:
         return len(self.start)
 
 
-def counted_up(rows: Rows, n_each: int = 1) -> Rows:
+def number_frames(rows: Rows, n_each: int = 1) -> Rows:
     """``rows``, ``n_each`` a frame, with numbers that ascend from frame to frame.
 
     If those of the file do not, they count from the first by 1, and the notes have its texts.
@@ -223,7 +223,7 @@ class _Reader:
             gap, width = self.data[at:start], self.widths.get(column, 0)
             at = stop
             if width:
-                pad = padding(self.data[start:stop], width)
+                pad = blanks_beside(self.data[start:stop], width)
                 blanks = gap[len(gap) - pad :] if width > 0 else self.data[stop : stop + pad]
                 if blanks != b" " * pad:
                     width = 0
@@ -292,7 +292,7 @@ class _Reader:
 _SIGNS = (b"-", b"+")
 
 
-def padding(token: bytes, width: int) -> int:
+def blanks_beside(token: bytes, width: int) -> int:
     """Blanks beside ``token`` in a column of this width."""
     if width == 1:
         return int(token[:1] not in _SIGNS)
@@ -331,7 +331,7 @@ def _width(tokens: Sequence[bytes], blanks: Sequence[int]) -> int:
     for fixed in sorted({0, min(blanks)}):
         width = max(n - fixed + len(token) for token, n in zip(tokens, blanks, strict=True))
         for guess in (width, 1):
-            pads = [padding(token, guess) for token in tokens]
+            pads = [blanks_beside(token, guess) for token in tokens]
             if guess <= MAX_WIDTH and all(
                 n - fixed == p for n, p in zip(blanks, pads, strict=True)
             ):

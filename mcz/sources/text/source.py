@@ -27,7 +27,7 @@ from mcz.sources.tables.layout import (
     Section,
     any_mark,
     build_table,
-    fill,
+    fill_marks,
     with_phrases,
 )
 from mcz.sources.text.layout import (
@@ -115,7 +115,7 @@ MOST_CHANNELS = 2**20
 MOST_DEPTH = 4096
 
 
-def check(what: str, number: int, most: int) -> None:
+def check_count(what: str, number: int, most: int) -> None:
     """Raise SourceError if a skeleton has more than it may have of ``what``."""
     if number > most:
         raise SourceError(f"more than {most:,} {what}, the limit of a stored skeleton")
@@ -238,7 +238,7 @@ def table_source(
 
 def _fills(header: bytes, names: Sequence[str], count: bytes, whole: bytes) -> bool:
     try:
-        return fill(header, names, count) == whole
+        return fill_marks(header, names, count) == whole
     except (FormatError, LimitError):
         return False
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.exchange.conversion.scenes.gltf import glb
+from mcz.exchange.conversion.scenes.gltf import build_glb
 from mcz.exchange.conversion.scenes.keys import find_keys
 from mcz.exchange.conversion.scenes.nodes import Scene, scene_of
-from mcz.exchange.conversion.scenes.usda import usda
+from mcz.exchange.conversion.scenes.usda import build_usda
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import Hint
 from mcz.model.motion import Motion
@@ -22,7 +22,7 @@ from mcz.version import VERSION
 KEY_ERROR_MM = 0.1
 KEY_ERROR_SIZE = 1 / 20_000  # of the figure, if its unit is unknown: 0.1 mm of 2 m
 MM_PER_M = 1000.0
-WRITERS = {"glb": glb, "usda": usda}
+WRITERS = {"glb": build_glb, "usda": build_usda}
 GENERATOR = f"mcz {VERSION}"
 GREATEST = 2.0**100  # of a coordinate, in meters
 

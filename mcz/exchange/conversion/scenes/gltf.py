@@ -23,7 +23,7 @@ from mcz.exchange.conversion.scenes.nodes import (
     SIDES,
     Scene,
     Solid,
-    knob,
+    marker_corners,
     solid_of,
 )
 from mcz.kinematics.chain import Floats
@@ -50,7 +50,7 @@ UP_MATRICES = {
 }
 
 
-def glb(scene: Scene, keys: SceneKeys, generator: str, extras: JsonObject) -> bytes:
+def build_glb(scene: Scene, keys: SceneKeys, generator: str, extras: JsonObject) -> bytes:
     """The file; ``extras`` are facts about the motion, which are kept under "asset"."""
     return _Document(scene, keys).bytes(generator, extras)
 
@@ -160,7 +160,7 @@ class _Document:
         return self._accessor(data, code, view=self._view(INDICES))
 
     def _knobs(self) -> list[JsonObject]:
-        corners = knob(MARKER * self.scene.size).astype("<f4")
+        corners = marker_corners(MARKER * self.scene.size).astype("<f4")
         position = self._accessor(corners, FLOAT, True, self._view(VERTICES))
         indices = self._indices(OCTAHEDRON, len(corners))
         return [

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError
-from mcz.exchange.conversion.hierarchy import loose_tails, moves, stretches
+from mcz.exchange.conversion.hierarchy import is_moving, is_stretching, loose_tails
 from mcz.exchange.conversion.losses import first_gap, left_out
 from mcz.hints import Hint
 from mcz.kinematics import point_set
@@ -234,7 +234,7 @@ class _Placements:
         loose = [
             (j, t)
             for j, t in keys
-            if (moves(skeleton, j) if t < 0 else stretches(skeleton.joints[j]))
+            if (is_moving(skeleton, j) if t < 0 else is_stretching(skeleton.joints[j]))
         ]
         self.places = {key: np.empty((motion.n_frames, 3)) for key in keys}
         self.shifts = {key: np.empty((motion.n_frames, 3)) for key in loose}
@@ -341,7 +341,7 @@ def _bones(scene: Scene) -> Iterator[tuple[Floats, int, int]]:
                 end = number if scene.nodes[child].shifts is None else child
                 yield _bone(places[number], bone, scene.size), number, end
         if not drawn and not (_is_reached(scene, number) and not below):
-            yield places[number] + knob(KNOB * scene.size), number, number
+            yield places[number] + marker_corners(KNOB * scene.size), number, number
 
 
 def _is_reached(scene: Scene, number: int) -> bool:
@@ -360,7 +360,7 @@ def _bone(start: Floats, bone: Floats, size: float) -> Floats:
     return np.stack([start, *(middle + wide * arm for arm in ring), start + bone])
 
 
-def knob(radius: float) -> Floats:
+def marker_corners(radius: float) -> Floats:
     """The corners of an octahedron around the origin, (6, 3)."""
     x, y, z = np.eye(3) * radius
     return np.stack([-z, x, y, -x, -y, z])

@@ -27,7 +27,7 @@ UP_TURNS = {  # degrees about x, y and z: that axis becomes y
 IDENTIFIER = re.compile(r"[^A-Za-z0-9_]")
 
 
-def usda(scene: Scene, keys: SceneKeys, generator: str, facts: JsonObject) -> bytes:
+def build_usda(scene: Scene, keys: SceneKeys, generator: str, facts: JsonObject) -> bytes:
     """The file, of keys in every frame; ``facts`` about the motion are kept with the layer."""
     name = identifiers([scene.name])[0]
     body = _markers(scene, keys) if scene.is_markers else _skeleton(scene, keys, name)
