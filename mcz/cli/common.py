@@ -29,7 +29,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.hints import PYTHON_HINTS, Hint, Words, worded
-from mcz.model.text_format import counted
+from mcz.model.text_format import count_text
 from mcz.model.types import JsonObject, Params
 
 if TYPE_CHECKING:
@@ -394,7 +394,7 @@ def _intact_counts(target: str | bytes) -> str | None:
     except MczError:
         return None
     counts = ((clips, "whole clip"), (damaged, "damaged clip"), (attachments, "attachment"))
-    parts = [counted(count, what) for count, what in counts if count]
+    parts = [count_text(count, what) for count, what in counts if count]
     if not parts:
         return None
     return f"it holds {', '.join(parts)}"

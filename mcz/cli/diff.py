@@ -23,7 +23,7 @@ from mcz.cli.common import (
 )
 from mcz.cli.figures import figure_lines
 from mcz.cli.terminal import echo, plural, print_json, table
-from mcz.model.text_format import first_of
+from mcz.model.text_format import first_names
 from mcz.model.types import JsonObject, Params
 
 if TYPE_CHECKING:
@@ -267,7 +267,7 @@ def lines_of(a: str, b: str, document: JsonObject) -> Iterator[str]:
     is_same = entries.get("mse_raw") == 0.0
     yield from (f"  {line}" for line in figure_lines(entries))
     if equal and not is_same:
-        yield f"  joints equal in every bit: {first_of(equal, SHOWN_NAMES)}"
+        yield f"  joints equal in every bit: {first_names(equal, SHOWN_NAMES)}"
     if feet is not None:
         yield f"  {_feet_line(feet)}"
     if joints is not None:
@@ -291,7 +291,7 @@ def _difference_line(difference: Params) -> str:
     for key in ("only_in_a", "only_in_b", "changed"):
         if names := difference[key]:
             words = key.replace("_", " ").replace(" a", " A").replace(" b", " B")
-            text += f"; {words}: {first_of(names, SHOWN_NAMES)}"
+            text += f"; {words}: {first_names(names, SHOWN_NAMES)}"
     return text
 
 
@@ -313,7 +313,7 @@ def _joint_lines(a: str, b: str, joints: JsonObject) -> Iterator[str]:
         )
     for path, names in ((a, joints["only_in_a"]), (b, joints["only_in_b"])):
         if names:
-            yield f"joints only in {path}: {first_of(names, SHOWN_NAMES)}"
+            yield f"joints only in {path}: {first_names(names, SHOWN_NAMES)}"
 
 
 def _feet_line(feet: Params) -> str:
@@ -321,7 +321,7 @@ def _feet_line(feet: Params) -> str:
     guessed = " (guessed)" if feet["up_guessed"] else ""
     assumed = " (assumed)" if feet["rate_assumed"] else ""
     return (
-        f"feet: {first_of(feet['joints'], SHOWN_NAMES)}; {feet['up_axis']} up{guessed}, "
+        f"feet: {first_names(feet['joints'], SHOWN_NAMES)}; {feet['up_axis']} up{guessed}, "
         f"{feet['frame_rate']:g} frames a second{assumed}"
     )
 

@@ -36,7 +36,7 @@ from mcz.cli.lazy import StrictCommand
 from mcz.cli.terminal import echo, is_terminal, plural, print_json, say, table
 from mcz.cli.verify import is_malformed
 from mcz.errors import FormatError, MczError
-from mcz.model.text_format import first_of
+from mcz.model.text_format import first_names
 from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
@@ -347,7 +347,7 @@ def _notes(clips: list[JsonObject]) -> Iterator[str]:
     if named:
         yield ""
     for note, names in named.items():
-        yield f"{note}: {first_of(names, CLIPS_IN_FULL)}"
+        yield f"{note}: {first_names(names, CLIPS_IN_FULL)}"
 
 
 def main() -> None:

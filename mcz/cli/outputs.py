@@ -98,10 +98,10 @@ def check_suffix(output: str | None, name: str, *, is_skeleton: bool) -> None:
 
 def _unknown(output: str, suffix: str, text: str, own: tuple[str, ...]) -> Failure:
     """The refusal of a suffix, with the nearest that would do."""
-    from mcz.model.text_format import nearest
+    from mcz.model.text_format import nearest_names
 
     known = list(dict.fromkeys((*filter(None, own), *(f".{name}" for name in TARGETS))))
-    near = nearest(suffix, known).replace("'", "")
+    near = nearest_names(suffix, known).replace("'", "")
     hint = OTHERS.get(suffix) or (f"did you mean {near}?" if near else f"known: {' '.join(known)}")
     return Failure(f"{text} {suffix}; {hint}", Exit.USAGE, path=output)
 

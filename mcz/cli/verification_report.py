@@ -12,7 +12,7 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import Attachment, File
 from mcz.files.reading.source_info import source_facts
 from mcz.model.schema import parse
-from mcz.model.text_format import counted, printable
+from mcz.model.text_format import count_text, printable
 from mcz.model.types import JsonObject, Params
 
 BLOCK = 1024 * 1024  # bytes that are hashed at a time
@@ -175,9 +175,9 @@ def text_lines(document: Params) -> list[str]:
     if "totals" in document:
         totals = document["totals"]
         kinds = ("clip", "frame", "skeleton", "attachment")
-        counts = [counted(totals[f"{kind}s"], kind) for kind in kinds]
+        counts = [count_text(totals[f"{kind}s"], kind) for kind in kinds]
         lines.append(_fact("holds", f"{', '.join(counts)}, {totals['aliases']} further names"))
-        text = f"{counted(totals['files'], 'file')}, {totals['files_bytes']:,} bytes"
+        text = f"{count_text(totals['files'], 'file')}, {totals['files_bytes']:,} bytes"
         lines.append(_fact("gives back", text))
     lines += _problems(document)
     for kind in ("clips", "skeletons", "attachments"):
@@ -194,7 +194,7 @@ def bag_lines(document: Params) -> list[str]:
     version, algorithms = document["bagit_version"], ", ".join(document["algorithms"])
     lines.append(_fact("checked", f"each file against the manifests: {algorithms}"))
     lines.append(_fact("format", f"BagIt {version}"))
-    count = counted(document["payload_files"], "file")
+    count = count_text(document["payload_files"], "file")
     lines.append(_fact("payload", f"{count}, {document['payload_bytes']:,} bytes"))
     lines += [_fact(name, value) for name, value in document["info"].items()]
     return _under_title(f"the bag {document['bag']}", document, lines + _problems(document))

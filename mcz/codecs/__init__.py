@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError, UnsupportedError
-from mcz.model.text_format import among
+from mcz.model.text_format import suggest_names
 
 
 class CodecEntry(NamedTuple):
@@ -98,9 +98,8 @@ ALIASES = {"lossy": "posewave"}  # the best lossy codec
 def codec_by_name(name: str) -> Codec:
     """Return the codec of a name or alias; raises OptionError if there is none."""
     if ALIASES.get(name, name) not in CODECS:
-        raise OptionError(
-            f"no codec is called {name!r}; the codecs are {among([*ALIASES, *CODECS], name)}"
-        )
+        codecs = suggest_names([*ALIASES, *CODECS], name)
+        raise OptionError(f"no codec is called {name!r}; the codecs are {codecs}")
     return CODECS[ALIASES.get(name, name)]
 
 

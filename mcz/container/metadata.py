@@ -16,7 +16,7 @@ from mcz.container.encodings import decode_data, encode_smallest
 from mcz.container.limits import BASE, MIB, Profile, check, metadata_limit
 from mcz.errors import FormatError, OptionError
 from mcz.model.schema import build, parse, parse_all
-from mcz.model.text_format import nearest
+from mcz.model.text_format import nearest_names
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +212,7 @@ def check_pair(key: str, value: str | None) -> None:
             f"{key!r} is determined by the clip's values or source, and cannot be set or removed"
         )
     if key not in KEYS and not (key.startswith(PRIVATE) and len(key) > len(PRIVATE)):
-        near = nearest(key, SETTABLE)
+        near = nearest_names(key, SETTABLE)
         hint = f"did you mean {near}?" if near else f"registered are {', '.join(SETTABLE)}"
         raise OptionError(
             f"metadata key {key!r} is not registered; {hint}; private keys begin with {PRIVATE!r}"

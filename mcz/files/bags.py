@@ -18,7 +18,7 @@ from pathlib import Path, PurePosixPath
 
 from mcz.errors import AccessError, ExistsError, FormatError, OptionError, reason_of
 from mcz.files.reading.faults import quick_check
-from mcz.model.text_format import counted
+from mcz.model.text_format import count_text
 
 PAYLOAD = "data"
 DECLARATION = "bagit.txt"
@@ -259,10 +259,10 @@ class _BagValidator:
     def _check_oxum(self) -> None:
         check = self.found
         check.n_bytes = sum((check.folder / path).stat().st_size for path in check.files)
-        counted = f"{check.n_bytes}.{len(check.files)}"
+        oxum = f"{check.n_bytes}.{len(check.files)}"
         for name, value in check.info:
-            if name.lower() == "payload-oxum" and value != counted:
-                self._fault(f"{INFO}: Payload-Oxum is {value}, there is {counted}")
+            if name.lower() == "payload-oxum" and value != oxum:
+                self._fault(f"{INFO}: Payload-Oxum is {value}, there is {oxum}")
 
 
 SUFFIX = ".mcz"
@@ -343,7 +343,7 @@ def _check_files(paths: Sequence[Path]) -> None:
         problems = quick_check(path)[1]
         if problems:
             more = f" and {len(problems) - 1} more" if len(problems) > 1 else ""
-            text = f"{counted(len(problems), 'fault')}: {problems[0].message}{more}"
+            text = f"{count_text(len(problems), 'fault')}: {problems[0].message}{more}"
             raise FormatError(f"damaged, so it was not added to the bag; {text}", path=path)
 
 

@@ -34,7 +34,7 @@ from mcz.files.query_tree import (
     printed,
     truth_of,
 )
-from mcz.model.text_format import among, nearest, shown
+from mcz.model.text_format import nearest_names, quote_name, suggest_names
 
 __all__ = ["Lookup", "Query", "Value"]
 
@@ -54,7 +54,7 @@ class Query:
         return Query, (self.text,)
 
     def __repr__(self) -> str:
-        return f"<Query {shown(self.text)}>"
+        return f"<Query {quote_name(self.text)}>"
 
     def __str__(self) -> str:
         """The same query with the fewest blanks and parentheses."""
@@ -76,9 +76,13 @@ class Query:
     def unknown(self, name: str, known: Collection[str]) -> OptionError:
         """The error for an unknown ``name``, one of ``names``."""
         at = next(t.at for t in tokens(self.text) if (t.kind, t.raw) == ("name", name))
-        near = nearest(name, known)
-        hint = f"did you mean {near}?" if near else f"known are {among(sorted(known), None)}"
-        return fault(self.text, at, f"{shown(name)} is neither a field nor a metadata key; {hint}")
+        near = nearest_names(name, known)
+        hint = (
+            f"did you mean {near}?" if near else f"known are {suggest_names(sorted(known), None)}"
+        )
+        return fault(
+            self.text, at, f"{quote_name(name)} is neither a field nor a metadata key; {hint}"
+        )
 
 
 DEEPEST = 64  # nested parentheses and ``not``
@@ -264,7 +268,7 @@ class Token:
 
     def __str__(self) -> str:
         """The name of the token in errors."""
-        return "the end" if self.kind == "end" else shown(self.raw)
+        return "the end" if self.kind == "end" else quote_name(self.raw)
 
 
 def fault(text: str, at: int, what: str) -> OptionError:
@@ -279,7 +283,7 @@ def fault(text: str, at: int, what: str) -> OptionError:
 def tokens(text: str) -> Iterator[Token]:
     """The tokens of ``text``, the last one of kind "end"; raises OptionError."""
     if not isinstance(text, str):
-        raise OptionError(f"where: {shown(repr(text))} is not a string")
+        raise OptionError(f"where: {quote_name(repr(text))} is not a string")
     if len(text) > LONGEST:
         raise OptionError(f"where: {len(text)} characters exceed the limit of {LONGEST}")
     at = 0
@@ -297,7 +301,7 @@ def tokens(text: str) -> Iterator[Token]:
 def _nothing_known(letter: str) -> str:
     if letter in "'\"":
         return f"the text that begins with {letter} has no end"
-    return f"{shown(letter)} means nothing here"
+    return f"{quote_name(letter)} means nothing here"
 
 
 def _token(kind: str, at: int, raw: str, text: str) -> Token:
@@ -308,10 +312,10 @@ def _token(kind: str, at: int, raw: str, text: str) -> Token:
             number = as_number(raw)
             if number is None:
                 limit = f"it has at most {LONGEST_NUMBER} characters and is finite"
-                raise fault(text, at, f"{shown(raw)} is too great a number: {limit}")
+                raise fault(text, at, f"{quote_name(raw)} is too great a number: {limit}")
             return Token(kind, at, raw, number)
         case "foreign":
-            raise fault(text, at, f"{shown(raw)} means nothing here, write {FOREIGN[raw]}")
+            raise fault(text, at, f"{quote_name(raw)} means nothing here, write {FOREIGN[raw]}")
         case "name" if raw in WORDS:
             return Token("word", at, raw, raw)
         case _:
@@ -322,6 +326,6 @@ def _unescaped(at: int, raw: str, text: str) -> str:
     r"""Unescape a quoted text: \' \" and \\ are the only escapes."""
     for match in _ESCAPE.finditer(raw):
         if match[1] not in "'\"\\":
-            what = rf"{shown(match[0])} is no escape; these are: \' \" \\"
+            what = rf"{quote_name(match[0])} is no escape; these are: \' \" \\"
             raise fault(text, at + match.start(), what)
     return _ESCAPE.sub(r"\1", raw[1:-1])

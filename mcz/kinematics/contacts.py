@@ -17,7 +17,7 @@ from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.points import first_points, positions_of
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.skeleton import column_of, signs_of
-from mcz.model.text_format import brief, counted
+from mcz.model.text_format import count_text, fields_text
 from mcz.model.types import Bools, Floats
 
 USUAL_RATE = 120.0  # assumed frames a second: the rate of CMU's AMC files
@@ -74,7 +74,7 @@ class Contacts:
     frame_rate: float = USUAL_RATE
     rate_assumed: bool = False
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     def __post_init__(self) -> None:
         for run in self.runs:
@@ -140,7 +140,7 @@ class FootTracks:
         if not indices:
             raise MotionError(
                 f"skeleton {skeleton.name!r}: none of its "
-                f"{counted(skeleton.n_joints, 'joint')} is named like a foot",
+                f"{count_text(skeleton.n_joints, 'joint')} is named like a foot",
                 hint=Hint.FEET,
             )
         if skeleton.unit_cm is None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from mcz.errors import OptionError
 from mcz.model.motion import Skeleton
-from mcz.model.text_format import among
+from mcz.model.text_format import suggest_names
 
 GROUPS = {
     "hands": r"hand|wrist|finger|thumb|index|middle|ring|pinky",
@@ -60,7 +60,7 @@ def find_joints(skeleton: Skeleton, name: str, option: str) -> list[int]:
     if not joints:
         known = ["feet", *GROUPS, *addresses]
         raise OptionError(
-            f"{option}: no joint or group {name!r}; the names are {among(known, name)}"
+            f"{option}: no joint or group {name!r}; the names are {suggest_names(known, name)}"
         )
     return joints
 
@@ -121,7 +121,7 @@ def _pair_numbers(numbers: Mapping[str, int], pairs: Mapping[str, str]) -> dict[
     for one, other in pairs.items():
         for name in (one, other):
             if name not in numbers:
-                known = among(list(numbers), name)
+                known = suggest_names(list(numbers), name)
                 raise OptionError(f"mirror: pairs: no joint {name!r}; the joints are {known}")
         a, b = numbers[one], numbers[other]
         if partners.get(a, b) != b or partners.get(b, a) != a:

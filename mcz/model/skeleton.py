@@ -329,9 +329,8 @@ class Skeleton:
                 joint = int(joint)
         if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
             return int(joint)
-        raise MotionError(
-            f"no joint {joint!r}; the joints are {text_format.among(self.addresses(), joint)}"
-        )
+        joints = text_format.suggest_names(self.addresses(), joint)
+        raise MotionError(f"no joint {joint!r}; the joints are {joints}")
 
 
 def first_columns(

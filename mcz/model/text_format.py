@@ -20,10 +20,10 @@ _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, WIDEST, 160
 _SHORT.maxtuple = _SHORT.maxlist = _SHORT.maxdict = 3
 
 
-def shown(name: str) -> str:
+def quote_name(name: str) -> str:
     """A name in quotes, cut in the middle if it is long.
 
-    >>> shown("walk"), len(shown("x" * 1000))
+    >>> quote_name("walk"), len(quote_name("x" * 1000))
     ("'walk'", 60)
     """
     return _SHORT.repr_str(str(name), 1)
@@ -69,36 +69,36 @@ def cell_text(cell: str) -> str:
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
-def counted(number: int, word: str) -> str:
+def count_text(number: int, word: str) -> str:
     """
-    >>> counted(1, "joint"), counted(31, "joint")
+    >>> count_text(1, "joint"), count_text(31, "joint")
     ('1 joint', '31 joints')
     """
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
-def first_of(names: Sequence[str], most: int) -> str:
+def first_names(names: Sequence[str], most: int) -> str:
     """
-    >>> first_of(["hips", "spine", "head"], 2)
+    >>> first_names(["hips", "spine", "head"], 2)
     'hips, spine and 1 more'
     """
     more = len(names) - most
     return ", ".join(names[:most]) + (f" and {more:,} more" if more > 0 else "")
 
 
-def among(names: Sequence[str], missed: object) -> str:
+def suggest_names(names: Sequence[str], missed: object) -> str:
     """Names for a message, and those that resemble ``missed``.
 
-    >>> among(["hips", "head"], "haed")
+    >>> suggest_names(["hips", "head"], "haed")
     "hips, head; did you mean 'head'?"
     """
     more = f" ... ({len(names)} in all)" if len(names) > MOST_LISTED else ""
-    near = nearest(missed, names) if isinstance(missed, str) else ""
+    near = nearest_names(missed, names) if isinstance(missed, str) else ""
     hint = f"; did you mean {near}?" if near else ""
     return f"{', '.join(names[:MOST_LISTED]) or 'no joints'}{more}{hint}"
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest_names(name: str, known: Iterable[str]) -> str:
     """The names most like ``name``, for a message; "" if there are none."""
     from difflib import get_close_matches
 
@@ -109,7 +109,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return " or ".join(repr(by_lower[one]) for one in matches)
 
 
-def brief(instance: Any) -> str:
+def fields_text(instance: Any) -> str:
     """A dataclass as its fields, of long ones the first items and their number."""
     parts = (f"{f.name}={_value(getattr(instance, f.name))}" for f in fields(instance) if f.repr)
     return f"{type(instance).__name__}({', '.join(parts)})"
@@ -129,40 +129,42 @@ def _value(value: Any) -> str:
 def skeleton_text(skeleton: Any) -> str:
     known = skeleton.unit_cm is not None
     unit = f"1 unit = {skeleton.unit_cm:.6g} cm" if known else "unit unknown"
-    counts = f"{counted(skeleton.n_joints, 'joint')}, {counted(skeleton.n_channels, 'channel')}"
+    counts = (
+        f"{count_text(skeleton.n_joints, 'joint')}, {count_text(skeleton.n_channels, 'channel')}"
+    )
     up_axis = f", {skeleton.up_axis} up" if skeleton.up_axis else ""
-    return f"<Skeleton {shown(skeleton.name)}: {counts}, {unit}{up_axis}>"
+    return f"<Skeleton {quote_name(skeleton.name)}: {counts}, {unit}{up_axis}>"
 
 
 def source_text(source: Any) -> str:
-    return f"<Source {shown(source.path)}: {source.format}, {source.size} bytes>"
+    return f"<Source {quote_name(source.path)}: {source.format}, {source.size} bytes>"
 
 
 def clips_text(clips: Any) -> str:
-    names = ", ".join(shown(name) for name in islice(clips, 3))
+    names = ", ".join(quote_name(name) for name in islice(clips, 3))
     more = f", ... ({len(clips)} in all)" if len(clips) > 3 else ""
-    return f"<Clips of {shown(clips.file_name)}: {names}{more}>"
+    return f"<Clips of {quote_name(clips.file_name)}: {names}{more}>"
 
 
 def exceptions_text(exceptions: Any) -> str:
-    return f"<Exceptions: {counted(len(exceptions), 'token')}>"
+    return f"<Exceptions: {count_text(len(exceptions), 'token')}>"
 
 
 def signal_text(signal: Any) -> str:
-    parts = [counted(signal.n_frames, "frame"), counted(signal.n_channels, "channel")]
+    parts = [count_text(signal.n_frames, "frame"), count_text(signal.n_channels, "channel")]
     if signal.samples_per_frame > 1:
         parts.append(f"{signal.samples_per_frame} rows a frame")
     if signal.mask is not None and not signal.mask.all():
-        parts.append(f"{counted(int((~signal.mask).sum()), 'value')} invalid")
-    return f"<Signal {shown(signal.name)}: {', '.join(parts)}>"
+        parts.append(f"{count_text(int((~signal.mask).sum()), 'value')} invalid")
+    return f"<Signal {quote_name(signal.name)}: {', '.join(parts)}>"
 
 
 def motion_text(motion: Any) -> str:
     known = motion.frame_rate is not None
     rate = f"{float(motion.frame_rate):g} Hz" if known else "an unknown rate"
-    parts = [counted(motion.skeleton.n_joints, "joint")]
-    parts.append(counted(motion.signals[0].n_channels, "channel"))
+    parts = [count_text(motion.skeleton.n_joints, "joint")]
+    parts.append(count_text(motion.signals[0].n_channels, "channel"))
     if len(motion.signals) > 1:
-        parts.append(counted(len(motion.signals), "signal"))
-    frames = counted(motion.n_frames, "frame")
-    return f"<Motion {shown(motion.name)}: {frames} at {rate}, {', '.join(parts)}>"
+        parts.append(count_text(len(motion.signals), "signal"))
+    frames = count_text(motion.n_frames, "frame")
+    return f"<Motion {quote_name(motion.name)}: {frames} at {rate}, {', '.join(parts)}>"

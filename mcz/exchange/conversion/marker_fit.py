@@ -15,7 +15,7 @@ from mcz.kinematics.inverse import solve_ik
 from mcz.kinematics.points import without_note
 from mcz.kinematics.targets import unsolved_channels
 from mcz.model.motion import Motion, Signal, Skeleton
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 
 FARTHEST = 2.0**100  # length units
 
@@ -40,7 +40,7 @@ class Fit:
     unit_cm: float | None
     unsolved: tuple[str, ...] = ()
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     @property
     def mean_error_cm(self) -> float | None:

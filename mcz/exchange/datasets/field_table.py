@@ -20,7 +20,7 @@ from mcz.kinematics.poses.trajectories import accelerations_of, find_points, vel
 from mcz.kinematics.rotations import matrices_of_vectors
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import Joints, column_of, signs_of
-from mcz.model.text_format import among
+from mcz.model.text_format import suggest_names
 from mcz.model.types import Floats
 from mcz.model.units import with_axes
 
@@ -305,7 +305,9 @@ def signal_shape(clip: Clip, field: Field) -> SignalShape:
     infos = {info.name: info for info in reversed(clip.signals)}
     if field.signal not in infos:
         known = [*FIELDS, *infos]
-        raise OptionError(f"no field or signal {field.name!r} among {among(known, field.name)}")
+        raise OptionError(
+            f"no field or signal {field.name!r} among {suggest_names(known, field.name)}"
+        )
     info = infos[field.signal]
     if info.channels is None:
         names = clip.skeleton.channel_addresses()

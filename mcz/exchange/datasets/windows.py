@@ -25,7 +25,7 @@ from mcz.exchange.datasets.sources import Member
 from mcz.files.reading.file import File
 from mcz.kinematics.poses.conversions import continuous_signs
 from mcz.model.checks import row_numbers
-from mcz.model.text_format import counted
+from mcz.model.text_format import count_text
 from mcz.model.types import JsonObject, Reals
 
 RUN_BLOCKS = 12  # of windows that stay together until a pool is shuffled
@@ -94,8 +94,8 @@ class Dataset:
 
     def __repr__(self) -> str:
         window = self._settings.window
-        what = "whole clips" if window is None else f"windows of {counted(window, 'frame')}"
-        clips = counted(len({member.label for member in self.members}), "clip")
+        what = "whole clips" if window is None else f"windows of {count_text(window, 'frame')}"
+        clips = count_text(len({member.label for member in self.members}), "clip")
         short = f", {len(self.skipped)} too short" if self.skipped else ""
         return f"<Dataset: {len(self)} {what} of {clips}{short}: {', '.join(self.fields)}>"
 

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from mcz.errors import ExistsError, MczError, remark_of
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Outcome:
     message: str = ""
     notes: tuple[str, ...] = ()
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 def failure_outcome(path: str, error: MczError | OSError) -> Outcome:
@@ -71,7 +71,7 @@ class Report:
     size: int | None = None
     left_out: list[str] = field(default_factory=list)
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     @property
     def failures(self) -> list[Outcome]:

@@ -44,7 +44,7 @@ from mcz.errors import (
 )
 from mcz.files.reading.faults import recovery_chunks
 from mcz.model.schema import parse
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 
 IN_MEMORY = 1 << 26  # bytes of an addition; a longer one is kept in a file next to the target
 BLOCK = 1 << 20
@@ -207,7 +207,7 @@ class Protection:
     burst: int
     cost: int
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 def add_recovery(

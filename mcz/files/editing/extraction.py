@@ -52,7 +52,7 @@ from mcz.files.writing.tuning import write_motion
 from mcz.model.motion import Motion
 from mcz.model.schema import build, parse
 from mcz.model.skeleton import Joints
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import Params, Progress, Target
 from mcz.sources import FORMATS
 
@@ -74,7 +74,7 @@ class ExtractedClip:
     data_bytes_before: int
     recoded: bool = False
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 @dataclass(slots=True)
@@ -89,7 +89,7 @@ class Extraction:
     damage: list[str] = field(default_factory=list)
     size: int = 0
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 def extract(

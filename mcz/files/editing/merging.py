@@ -49,7 +49,7 @@ from mcz.files.reading.file import File, open
 from mcz.files.writing.atomic import WriteTransaction, check_name, clip_name, replacing_file
 from mcz.files.writing.file import SourceEncoder
 from mcz.model.schema import parse
-from mcz.model.text_format import counted, shown
+from mcz.model.text_format import count_text, quote_name
 from mcz.model.types import Progress, Target
 from mcz.sources import wants_skeleton
 
@@ -152,7 +152,7 @@ class Merger:
             pairs = [(file, self._plan_file(file, double)) for file in files]
             if double:
                 raise OptionError(
-                    f"{list_some(double)}: {counted(len(double), 'name')} in more than one "
+                    f"{list_some(double)}: {count_text(len(double), 'name')} in more than one "
                     "file; rename the later ones, or skip identical content"
                 )
             yield pairs
@@ -176,7 +176,7 @@ class Merger:
                 path = path_of(file, thing) if kind == CLIP else ""
                 plan.things[thing] = Change(new, new.removesuffix(name) + path if path else None)
             else:
-                double.append(f"{kind} {shown(name)}")
+                double.append(f"{kind} {quote_name(name)}")
                 continue
             self.report.outcomes.append(Outcome(name, result, 0, new))
         for thing, change in plan.things.items():

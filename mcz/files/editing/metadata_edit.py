@@ -29,7 +29,7 @@ from mcz.files.reading.clips import Where, list_some, names_of
 from mcz.files.reading.fidelity import states_rate
 from mcz.files.reading.file import File, open
 from mcz.model.motion import frame_rate_of
-from mcz.model.text_format import among, cell_text, shown
+from mcz.model.text_format import cell_text, quote_name, suggest_names
 from mcz.model.types import Progress, Target
 from mcz.sources import FORMATS
 
@@ -162,7 +162,7 @@ def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
         )
     if clip.frame_rate not in (None, rate) and not force:
         raise OptionError(
-            f"clip {shown(clip.name)} already has {float(clip.frame_rate or 0):g} frames a "
+            f"clip {quote_name(clip.name)} already has {float(clip.frame_rate or 0):g} frames a "
             "second; use force to change it"
         )
 
@@ -272,7 +272,7 @@ def _namer(
         for name in _match_columns(form):
             if name not in head:
                 raise OptionError(
-                    f"no column {name!r}; the columns are {among(head, name)}", path=path
+                    f"no column {name!r}; the columns are {suggest_names(head, name)}", path=path
                 )
 
         def formatted(row: Mapping[str, str]) -> str:
@@ -303,7 +303,7 @@ def _chosen_columns(
     odd = [name for name in columns if not _is_key(name) and name not in used]
     if odd:
         raise OptionError(
-            f"{among(odd, None)}: not metadata keys; choose columns with take, such as "
+            f"{suggest_names(odd, None)}: not metadata keys; choose columns with take, such as "
             f"description={odd[0]}",
             path=path,
         )

@@ -45,7 +45,7 @@ from mcz.files.editing.rewriting import UNPROTECTED, disk_path, plan_whole, rewr
 from mcz.files.reading.file import open_bytes
 from mcz.files.writing.atomic import replacing_file
 from mcz.model.checks import merged_ranges
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import Progress, Target
 
 MOST_SHIFTS = 16
@@ -70,7 +70,7 @@ class Recovery:
     behind: int = 0
     possible: bool = True
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     def lines(self) -> list[str]:
         """Lines on bad blocks; none for an intact file."""

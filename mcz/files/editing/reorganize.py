@@ -43,7 +43,7 @@ from mcz.files.reading.file import File, open
 from mcz.files.reading.sizes import models_used
 from mcz.files.writing.atomic import check_name
 from mcz.hints import Hint
-from mcz.model.text_format import counted, nearest, shown
+from mcz.model.text_format import count_text, nearest_names, quote_name
 from mcz.model.types import Progress, Target
 
 FOLDER = "folder"  # split by the first part of the names
@@ -104,7 +104,7 @@ def _find_thing(file: File, name: str) -> Thing:
         return CLIP, clips[0]
     if clips:
         raise OptionError(f"{name!r} is ambiguous: {list_some(clips)}; choose one", path=file.name)
-    near = nearest(name, [other for _, other in things_in(file)])
+    near = nearest_names(name, [other for _, other in things_in(file)])
     suggestion = f"; did you mean {near}?" if near else ""
     raise OptionError(
         f"no clip, attachment or alias is called {name!r}{suggestion}", path=file.name
@@ -175,12 +175,12 @@ def _refuse_equal(file: File, plan: Plan) -> None:
     for (kind, name), number in names.items():
         if number > 1:
             kinds = "aliases" if kind == ALIAS else f"{kind}s"
-            raise OptionError(f"two {kinds} would have the name {shown(name)}", path=file.name)
+            raise OptionError(f"two {kinds} would have the name {quote_name(name)}", path=file.name)
     before = Counter(path_of(file, thing) for thing in plan.things)
     after = Counter(path_of(file, thing, change) for thing, change in plan.things.items())
     for path, number in after.items():
         if path and number > 1 and number > before[path]:
-            raise OptionError(f"two files would be restored to {shown(path)}", path=file.name)
+            raise OptionError(f"two files would be restored to {quote_name(path)}", path=file.name)
 
 
 def reorder_clips(
@@ -262,7 +262,7 @@ def split(
         for value, names in groups.items():
             plan, part = _plan_part(file, names, with_rest=value == rest), Report()
             Rewriting(target, outputs[value], force, None, file).write(plan, part, step)
-            message = counted(len(names), "clip")
+            message = count_text(len(names), "clip")
             report.outcomes.append(Outcome(str(outputs[value]), "written", part.size or 0, message))
     return report
 
@@ -284,7 +284,7 @@ def _group_clips(file: File, by: str, rest: str | None) -> dict[str, list[str]]:
     elif without or file.attachments or others:
         left = [(len(without), "clip"), (len(file.attachments), "attachment")]
         left.append((sum(kind == ChunkType.SKEL for kind, _ in others), "skeleton"))
-        text = ", ".join(counted(n, word) for n, word in left if n)
+        text = ", ".join(count_text(n, word) for n, word in left if n)
         if text:
             raise OptionError(f"{text} without {by}; name a file for the rest", path=file.name)
     return groups

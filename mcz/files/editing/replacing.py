@@ -39,7 +39,7 @@ from mcz.files.writing.atomic import replacing_file
 from mcz.files.writing.clip_writer import check_values
 from mcz.files.writing.quality import figures, texts_of
 from mcz.model.schema import parse
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import Progress, Target, Values
 
 RECODED = "edit-recoded"
@@ -70,7 +70,7 @@ class Replacement:
     anew: bool = False
     others_error: float = 0.0
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 def replace(

@@ -36,7 +36,7 @@ from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, LostFrameError, TruncatedError, UnsupportedError
 from mcz.files.reading.signal_info import SignalInfo, check_roles, read_signal
 from mcz.model.motion import Skeleton
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import Floats, Values
 
 Mask = NDArray[np.bool_]
@@ -59,7 +59,7 @@ class LiveFrame:
     valid: Mask
     state: State = "decoded"
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 class Concealer:

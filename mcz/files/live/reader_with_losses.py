@@ -39,7 +39,7 @@ from mcz.files.live.clip_state import (
     row_of,
 )
 from mcz.model.schema import MAX_COUNT, parse
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 
 MOST_MADE_UP = 65_536  # frames in place of lost ones, and one more for every received byte
 MOST_REMARKS = 20
@@ -66,7 +66,7 @@ class StreamSummary:
     n_faults: int = 0
     remarks: list[str] = field(default_factory=list)
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     def count(self, frame: LiveFrame) -> None:
         setattr(self, frame.state, getattr(self, frame.state) + 1)

@@ -40,7 +40,7 @@ from mcz.files.writing.signal_source import MemorySource
 from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.points import NOTE, SEPARATOR, marker_skeleton
 from mcz.model.motion import Motion, Signal, Skeleton
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import Floats, Params
 
 MOST_OVER = 1.05  # of a rate that counts as kept
@@ -65,7 +65,7 @@ class LiveTraffic:
     asked: float | None = None
     seconds: float | None = None
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     @property
     def is_held(self) -> bool:

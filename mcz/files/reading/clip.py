@@ -47,7 +47,7 @@ from mcz.model.clock import (
 from mcz.model.motion import Motion, Signal, Skeleton, Source, joint_columns
 from mcz.model.notebook import html_of
 from mcz.model.skeleton import Joints, joint_list
-from mcz.model.text_format import shown
+from mcz.model.text_format import quote_name
 from mcz.model.types import Values
 from mcz.sources import FORMATS
 
@@ -77,7 +77,7 @@ class Clip(StoredClip):
         return _reopen, (self.container, self.name)
 
     def __repr__(self) -> str:
-        return f"<Clip {shown(self.name)}: {self.n_frames} frames, {self.n_channels} channels>"
+        return f"<Clip {quote_name(self.name)}: {self.n_frames} frames, {self.n_channels} channels>"
 
     @property
     def values(self) -> ClipValues:
@@ -308,8 +308,8 @@ class Clip(StoredClip):
         frames if the codec stores some apart (qbc: its marks); otherwise they are its coarsest
         resolution. Raises OptionError for a codec without either.
         """
-        shown = self.previewed(joints)
-        return FrameValues(shown.frames, shown.masked())
+        preview = self.previewed(joints)
+        return FrameValues(preview.frames, preview.masked())
 
     def previewed(self, joints: Joints = None) -> Preview:
         """``preview`` with a separate mask, and the distance of its frames."""

@@ -23,7 +23,7 @@ from mcz.container.reader import Container
 from mcz.errors import FormatError, OptionError, UnknownNameError, UnsupportedError
 from mcz.files.reading.clip import Clip
 from mcz.model import text_format
-from mcz.model.text_format import among, nearest
+from mcz.model.text_format import nearest_names, suggest_names
 from mcz.sources import format_by_id
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def getter_of(name: str, clips: Collection[Clip]) -> Getter:
     """
     getter = _find_getter(name, clips)
     if getter is None:
-        known_names = among(sorted(_known_names(name, clips)), name)
+        known_names = suggest_names(sorted(_known_names(name, clips)), name)
         raise OptionError(
             f"{name!r} is neither a field nor a metadata key; the fields and keys are {known_names}"
         )
@@ -267,7 +267,7 @@ def _last_parts(names: Named) -> Named:
 
 
 def _suggestion(clips: Iterable[str], name: str) -> str:
-    near = nearest(name, [*clips, *(clip.rpartition("/")[2] for clip in clips)])
+    near = nearest_names(name, [*clips, *(clip.rpartition("/")[2] for clip in clips)])
     return f"did you mean {near}?" if near else f"there are: {list_some(clips) or 'none'}"
 
 

@@ -27,7 +27,7 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where
 from mcz.files.reading.file import File, open, open_bytes
 from mcz.files.reading.signal_info import read_segments
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import Target
 
 HEADINGS = tuple(
@@ -47,7 +47,7 @@ class Problem:
     message: str
     clip: str | None = None
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 def heading(source: ByteSource, offset: int) -> str:

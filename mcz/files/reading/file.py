@@ -34,7 +34,7 @@ from mcz.files.reading.lost_skeletons import restore_skeletons
 from mcz.files.reading.source_info import sourced_skeleton
 from mcz.model.motion import Skeleton
 from mcz.model.schema import parse
-from mcz.model.text_format import counted, shown
+from mcz.model.text_format import count_text, quote_name
 from mcz.model.threads import check_threads
 from mcz.model.types import JsonObject, Params, Target
 from mcz.sources import FORMATS
@@ -84,7 +84,7 @@ class Attachment:
         self.name, self.size = row.name, row.size
 
     def __repr__(self) -> str:
-        return f"<Attachment {shown(self.name)}: {self.size} bytes>"
+        return f"<Attachment {quote_name(self.name)}: {self.size} bytes>"
 
     def read(self) -> bytes:
         """The bytes, their hash checked."""
@@ -112,10 +112,9 @@ class File:
         return file_of, (self.container,)
 
     def __repr__(self) -> str:
-        counts = (
-            f"{counted(len(self.clips), 'clip')}, {counted(len(self.attachments), 'attachment')}"
-        )
-        return f"<File {shown(self.name)}: {counts}, {self.size} bytes>"
+        clips = count_text(len(self.clips), "clip")
+        attachments = count_text(len(self.attachments), "attachment")
+        return f"<File {quote_name(self.name)}: {clips}, {attachments}, {self.size} bytes>"
 
     def __iter__(self) -> Iterator[Clip]:
         return iter(self.clips.values())
@@ -263,9 +262,9 @@ class File:
             return clips
         matches = list(filter_clips(clips, where, self.clips.values()))
         if not matches:
-            query = shown(where) if isinstance(where, str) else "what is asked for"
+            query = quote_name(where) if isinstance(where, str) else "what is asked for"
             raise OptionError(
-                f"none of {counted(len(clips), 'clip')} matches {query}", path=self.name
+                f"none of {count_text(len(clips), 'clip')} matches {query}", path=self.name
             )
         return matches
 

@@ -19,7 +19,7 @@ from mcz.files.reading.file import is_mcz, open
 from mcz.files.reading.source_files import SourceOptions, load, read_skeleton, read_source
 from mcz.hints import Hint
 from mcz.model.motion import Motion, Skeleton
-from mcz.model.text_format import first_of
+from mcz.model.text_format import first_names
 from mcz.model.units import in_unit
 from mcz.sources import Format, format_of
 from mcz.sources.text.bones import Candidate, Match, match_bones, skeletons_around
@@ -284,7 +284,7 @@ def _ambiguous_error(path: Path, tried: Sequence[_Candidate], text: str) -> Ambi
 
 
 def _riddle_error(path: Path, tried: Sequence[_Candidate], text: str) -> SourceError:
-    shown = first_of([_printable(one.describe(path.parent)) for one in tried], SHOWN)
+    shown = first_names([_printable(one.describe(path.parent)) for one in tried], SHOWN)
     return SourceError(f"{text}: {shown}", path=path, hint=Hint.SKELETON)
 
 

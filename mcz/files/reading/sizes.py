@@ -20,7 +20,7 @@ from mcz.files.reading.clips import packet_framing
 from mcz.files.reading.file import File
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.model.schema import build
-from mcz.model.text_format import first_of
+from mcz.model.text_format import first_names
 
 MOST_NAMED = 4  # joints of a group that are named
 
@@ -283,7 +283,9 @@ def group_names(clip: Clip, signal: SignalInfo) -> list[tuple[int, str]]:
     names = []
     for number, group in enumerate(signal.layout.groups):
         called = channels if len(group) == 1 else owners
-        names.append((number, first_of(list(dict.fromkeys(called[c] for c in group)), MOST_NAMED)))
+        names.append(
+            (number, first_names(list(dict.fromkeys(called[c] for c in group)), MOST_NAMED))
+        )
     return names
 
 

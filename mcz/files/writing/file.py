@@ -54,7 +54,7 @@ from mcz.hints import Hint, Remark
 from mcz.kinematics.rest_pose import height_note
 from mcz.model.clock import SAME_RATE
 from mcz.model.motion import Motion, Skeleton
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.threads import limit_threads
 from mcz.model.types import Params, Progress, Target
 from mcz.model.units import in_unit
@@ -215,7 +215,7 @@ class WrittenClip:
     n_channels: int
     quality: Mapping[str, str] | None = None
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +236,7 @@ class Written:
     source_bytes: int = 0
     inputs: tuple[str, ...] = ()
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 def summarize(

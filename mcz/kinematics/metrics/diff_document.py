@@ -19,7 +19,7 @@ from mcz.kinematics.metrics.comparison import compare
 from mcz.kinematics.metrics.figures import Comparison
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.motion import Motion, Skeleton
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import JsonObject, Params
 
 BLOCK = 2**20  # coordinates a block
@@ -42,7 +42,7 @@ class JointErrors:
     frame: int | None = None
     joint: str | None = None
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     def document(self) -> JsonObject:
         """All figures by name, distances in centimeters too."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from mcz.kinematics.contacts import Contact, Contacts, FootTracks
 from mcz.kinematics.metrics.sums import Number, mean_of, scale_figure
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import Floats
 
 MM = 10.0  # of a cm
@@ -52,7 +52,7 @@ class Sliding:
     path_mm: Number = None
     path_original_mm: Number = None
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     def entries(self) -> dict[str, float | int | str | None]:
         """The figures by the metric ids of SPEC.md."""
@@ -235,7 +235,7 @@ class Comparison:
     signals: Mapping[str, Number] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     @property
     def mean_position_error_cm(self) -> Number:

@@ -32,7 +32,7 @@ from mcz.kinematics.rotations import (
 )
 from mcz.model.motion import Channel, Skeleton
 from mcz.model.skeleton import Joints
-from mcz.model.text_format import shown
+from mcz.model.text_format import quote_name
 from mcz.model.types import Floats, Reals
 
 # Dimensions that each representation adds to an array of rotations.
@@ -320,7 +320,7 @@ def _is_named(name: str | None) -> bool:
 
 
 def _describe_columns(names: Sequence[str | None], at: int) -> str:
-    return f"columns {at + 1} to {at + SIZE} ({shown(str(names[at]))}, ...)"
+    return f"columns {at + 1} to {at + SIZE} ({quote_name(str(names[at]))}, ...)"
 
 
 def slerp_quaternions(first: Floats, last: Floats, share: Floats) -> Floats:

@@ -29,7 +29,7 @@ from mcz.kinematics.poses.conversions import from_matrices
 from mcz.model.clock import known_timeline
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import Joints, column_of, joint_list, signs_of
-from mcz.model.text_format import among, brief
+from mcz.model.text_format import fields_text, suggest_names
 from mcz.model.types import Floats, Reals
 
 
@@ -60,7 +60,9 @@ def find_points(skeleton: Skeleton, joints: Joints) -> list[int]:
         try:
             points.append(firsts[skeleton.find(joint)])
         except MotionError:
-            raise MotionError(f"no point {joint!r}; the points are {among(names, joint)}") from None
+            raise MotionError(
+                f"no point {joint!r}; the points are {suggest_names(names, joint)}"
+            ) from None
     return points
 
 
@@ -162,7 +164,7 @@ class Root:
     rotations: Reals
     up_axis: str
 
-    __repr__ = brief
+    __repr__ = fields_text
 
     @property
     def headings(self) -> Reals:

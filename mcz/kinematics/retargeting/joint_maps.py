@@ -19,7 +19,7 @@ import numpy as np
 from mcz.errors import MotionError, OptionError
 from mcz.model.motion import POSITION_KINDS, TURNING_KINDS, Channel, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
-from mcz.model.text_format import among, nearest
+from mcz.model.text_format import nearest_names, suggest_names
 from mcz.model.types import Floats
 
 LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow")  # parts of a side
@@ -43,7 +43,7 @@ def _joints(known: str | Skeleton) -> dict[str, str]:
     if isinstance(known, Skeleton):
         return _recognize_joints(known)
     if not isinstance(known, str) or known not in SKELETONS:
-        near = nearest(known, SKELETONS) if isinstance(known, str) else ""
+        near = nearest_names(known, SKELETONS) if isinstance(known, str) else ""
         raise OptionError(
             f"joint_map: no skeleton {known!r} among {', '.join(SKELETONS)}"
             + (f"; did you mean {near}?" if near else "")
@@ -237,12 +237,12 @@ def match_joints(
         if name not in theirs:
             raise OptionError(
                 f"retarget: joint_map: the motion has no joint {name!r}; its joints are "
-                f"{among(theirs, name)}"
+                f"{suggest_names(theirs, name)}"
             )
         if other not in ours:
             raise OptionError(
                 f"retarget: joint_map: the skeleton has no joint {other!r}; its joints are "
-                f"{among(ours, other)}"
+                f"{suggest_names(ours, other)}"
             )
         number = ours.index(other)
         if number in pairs:

@@ -36,7 +36,7 @@ from mcz.model.motion import (
     Skeleton,
     joint_columns,
 )
-from mcz.model.text_format import among
+from mcz.model.text_format import suggest_names
 from mcz.model.types import Floats
 
 Named = TypeVar("Named", Motion, Skeleton)
@@ -68,7 +68,9 @@ def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
     given: set[int] = set()
     for old, new in mapping.items():
         if old not in addresses:
-            raise OptionError(f"rename: no joint {old!r}; the joints are {among(addresses, old)}")
+            raise OptionError(
+                f"rename: no joint {old!r}; the joints are {suggest_names(addresses, old)}"
+            )
         if not isinstance(new, str) or not new:
             raise OptionError(f"rename: {new!r} is not a valid name for joint {old!r}")
         index = addresses.index(old)
@@ -165,7 +167,7 @@ def _kept_joints(skeleton: Skeleton, joints: str | int | Iterable[str | int]) ->
         try:
             kept.add(skeleton.find(joint))
         except MotionError:
-            names = among(skeleton.joint_names, joint)
+            names = suggest_names(skeleton.joint_names, joint)
             raise OptionError(f"select: no joint {joint!r}; the joints are {names}") from None
     return sorted(kept)
 

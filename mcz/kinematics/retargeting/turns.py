@@ -19,7 +19,7 @@ from mcz.kinematics.retargeting.joint_maps import limbs_of, nearest_above
 from mcz.kinematics.rotation_fit import polish_turns, set_turns
 from mcz.kinematics.rotations import ORDERS
 from mcz.model.motion import Skeleton
-from mcz.model.text_format import among
+from mcz.model.text_format import suggest_names
 from mcz.model.types import Bools, Floats
 
 
@@ -198,7 +198,7 @@ def _numbers(target: Skeleton, pairs: Mapping[int, int], alike: Iterable[str]) -
         if name not in names:
             raise OptionError(
                 f"retarget: match_rest: no mapped joint of the skeleton is called {name!r}; "
-                f"the mapped joints are {among(list(names), name)}"
+                f"the mapped joints are {suggest_names(list(names), name)}"
             )
     return {names[name] for name in alike}
 

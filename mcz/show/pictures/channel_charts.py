@@ -16,7 +16,7 @@ from mcz.kinematics.chain import Floats
 from mcz.kinematics.frames import signal_of
 from mcz.kinematics.poses import velocities
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal
-from mcz.model.text_format import among, printable
+from mcz.model.text_format import printable, suggest_names
 from mcz.show.pictures.canvases import Theme
 from mcz.show.pictures.charts import Chart, Sheet, legend, line, rows_of, style
 
@@ -155,7 +155,7 @@ def _signal_of(motion: Motion, selection: Selection) -> int:
     having = [k for k, signal in enumerate(motion.signals) if names <= {*_labels(signal.channels)}]
     if not having:
         known = [label for signal in motion.signals for label in _labels(signal.channels)]
-        shown = among(known, next(iter(names))) if known else "none"
+        shown = suggest_names(known, next(iter(names))) if known else "none"
         raise OptionError(f"no signal has the channels {', '.join(sorted(names))}; {shown}")
     return having[0]
 
@@ -174,7 +174,7 @@ def _columns(
         return list(range(len(labels)))[:MOST_SERIES], (more,) * (len(labels) > MOST_SERIES)
     for name in names:
         if name not in labels:
-            shown = among(labels, name)
+            shown = suggest_names(labels, name)
             raise OptionError(f"signal {signal!r} has no channel {name!r}, but {shown}")
     return [labels.index(name) for name in names], ()
 

@@ -29,7 +29,7 @@ from mcz.files.writing.atomic import replacing
 from mcz.hints import Hint, with_hint
 from mcz.kinematics.metrics.diff_document import diff_document
 from mcz.model.extras import annex_bytes
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.model.types import JsonObject, Params, Target
 from mcz.show.viewing.file_registry import FACTS, FileRegistry, RegisteredFile, Report
 
@@ -181,7 +181,7 @@ class Embedded:
     size: int
     n_clips: int
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +192,7 @@ class PageWritten:
     player_size: int
     files: tuple[Embedded, ...]
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 def write_page(

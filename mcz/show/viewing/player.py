@@ -26,7 +26,7 @@ from mcz.kinematics.joint_names import sides_of
 from mcz.kinematics.points import first_points, listed_points
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.skeleton import column_of, signs_of
-from mcz.model.text_format import counted, shown
+from mcz.model.text_format import count_text, quote_name
 from mcz.show.viewing.file_registry import FileRegistry, RegisteredFile
 from mcz.show.viewing.page import OTHER, Page, page
 
@@ -95,7 +95,7 @@ def _times(moving: Moving, drawing: PointSamples) -> list[float] | None:
 
 def _caption(moving: Moving, drawing: PointSamples) -> str:
     rate = moving.frame_rate
-    text = f"{shown(moving.name)}: {counted(moving.n_frames, 'frame')}"
+    text = f"{quote_name(moving.name)}: {count_text(moving.n_frames, 'frame')}"
     text += " at an unknown rate" if rate is None else f" at {float(rate):g} Hz"
     if drawing.n_read < moving.n_frames:
         text += f"; frames 0 to {drawing.n_read - 1} are shown"

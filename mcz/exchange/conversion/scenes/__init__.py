@@ -16,7 +16,7 @@ from mcz.exchange.conversion.scenes.usda import build_usda
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import Hint
 from mcz.model.motion import Motion
-from mcz.model.text_format import brief
+from mcz.model.text_format import fields_text
 from mcz.version import VERSION
 
 KEY_ERROR_MM = 0.1
@@ -48,7 +48,7 @@ class SceneFile:
     has_unit: bool
     notes: tuple[str, ...]
 
-    __repr__ = brief
+    __repr__ = fields_text
 
 
 def to_scene(
