@@ -58,17 +58,15 @@ if TYPE_CHECKING:
     from mcz.files.editing.repair import Repair, repair
     from mcz.files.editing.replacing import Replacement, replace
     from mcz.files.editing.unpacking import unpack
-    from mcz.files.live.clip_state import LiveFrame
+    from mcz.files.live.clip_state import LiveFrame, StreamSummary
     from mcz.files.live.generators import LiveReader, live_frames, stream_decode, stream_encode
-    from mcz.files.live.reader_with_losses import StreamSummary
     from mcz.files.live.writer import LiveWriter
     from mcz.files.reading.clip import Clip
     from mcz.files.reading.faults import Problem, verify
     from mcz.files.reading.file import Attachment, File, open
     from mcz.files.reading.post_filtering import post_filter
     from mcz.files.reading.read import read
-    from mcz.files.reading.source_files import read_skeleton
-    from mcz.files.reading.source_info import recording
+    from mcz.files.reading.source_files import read_skeleton, recording
     from mcz.files.tables import to_pandas, to_xarray
     from mcz.files.writing.file import encode, to_npz, write
     from mcz.hints import Hint
@@ -126,7 +124,7 @@ _HOMES = {
     "mcz.files.editing.merging": ("merge",),
     "mcz.files.editing": ("Outcome", "Report"),
     "mcz.files.reading.clip": ("Clip",),
-    "mcz.files.live.clip_state": ("LiveFrame",),
+    "mcz.files.live.clip_state": ("LiveFrame", "StreamSummary"),
     "mcz.exchange.conversion": ("Fit", "convert", "from_positions", "left_out"),
     "mcz.exchange.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
     "mcz.files.editing.appending": ("Protection",),
@@ -156,7 +154,7 @@ _HOMES = {
     "mcz.files.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.files.reading.file": ("Attachment", "File", "open"),
     "mcz.files.reading.read": ("read",),
-    "mcz.files.reading.source_info": ("recording",),
+    "mcz.files.reading.source_files": ("read_skeleton", "recording"),
     "mcz.files.writing.file": ("encode", "to_npz", "write"),
     "mcz.files.reading.post_filtering": ("post_filter",),
     "mcz.kinematics.points": ("in_positions",),
@@ -186,7 +184,6 @@ _HOMES = {
         "Skeleton",
         "Source",
     ),
-    "mcz.files.reading.source_files": ("read_skeleton",),
     "mcz.kinematics.rest_pose": ("rest_positions",),
     "mcz.sources.arrays.body_models": ("offsets_from_positions", "offsets_of_model"),
     "mcz.sources.arrays.array_files": ("split_clips",),
@@ -197,7 +194,6 @@ _HOMES = {
     "mcz.kinematics.retargeting.retargeting": ("retarget",),
     "mcz.kinematics.retargeting.selection": ("rename", "select", "with_offsets"),
     "mcz.files.live.generators": ("LiveReader", "live_frames", "stream_decode", "stream_encode"),
-    "mcz.files.live.reader_with_losses": ("StreamSummary",),
     "mcz.show.viewing.view": ("View", "view"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -13,7 +13,7 @@ import numpy as np
 from mcz import FormatError, LostFrameError, OptionError
 from mcz.codecs.contract import Codec, Encoded, LiveEncoder, Segment
 from mcz.codecs.parameters import Parameter, integer, number
-from mcz.files.live.text_writer import begin_live
+from mcz.files.live.generators import begin_live
 from mcz.model.schema import read_varint, varint
 
 ID = 252

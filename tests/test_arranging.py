@@ -238,7 +238,7 @@ def test_a_rate_that_is_set_later(files: tuple[Path, Path], takes: Path, tmp_pat
     with rewriting(path) as job:
         assert job.file.clips["walk"].frame_rate is None
         plan = plan_whole(job.file)
-        plan.things["clip", "walk"] = Change(rate=Fraction(30000, 1001))
+        plan.changes["clip", "walk"] = Change(rate=Fraction(30000, 1001))
         job.write(plan, Report(), lambda name: None)
     assert sound(path).clips["walk"].frame_rate == Fraction(30000, 1001)
     assert contents(path)["walk.amc"] == (takes / "a" / "walk.amc").read_bytes()

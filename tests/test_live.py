@@ -29,8 +29,9 @@ from mcz.container.chunks import (
     build_packet,
 )
 from mcz.container.writer import Writer
+from mcz.files.live.clip_state import StreamSummary
 from mcz.files.live.generators import live_frames
-from mcz.files.live.reader_with_losses import FramesWithLosses, StreamSummary
+from mcz.files.live.reader_with_losses import FramesWithLosses
 from mcz.files.live.writer import LiveWriter
 from mcz.files.reading.clips import packet_framing
 from mcz.files.reading.report import info

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, codecs
 from mcz.codecs.contract import Encoded, Segment
-from mcz.files.writing.quality import LEFT_OUT, quality_entries
+from mcz.files.writing.clip_writer import LEFT_OUT, quality_entries
 from mcz.kinematics.angles import Unwrapper, unwrap, whole_turns
 from tests import overlap_codec
 from tests.motions import POSITIONS, motions, skeleton, smooth, write_bytes

@@ -15,8 +15,9 @@ from mcz.codecs import codec_by_name
 from mcz.container.writer import Writer
 from mcz.errors import OptionError
 from mcz.files.editing.recoding import recorded_options
+from mcz.files.writing.clip_writer import write_plan
 from mcz.files.writing.planning import prepare
-from mcz.files.writing.tuning import write_motion
+from mcz.files.writing.tuning import tuned_plan
 from tests.commands import run
 from tests.motions import smooth
 
@@ -35,7 +36,8 @@ def write_bytes(motions: list[mcz.Motion], codec: str) -> bytes:
     writer = Writer(out)
     for one in motions:
         found, params = codec_by_name(codec), CODECS[codec]
-        write_motion(writer, prepare(one, found, params), found, params)
+        plan = tuned_plan(prepare(one, found, params), found, params, writer.profile)
+        write_plan(writer, plan)
     writer.finish()
     return out.getvalue()
 

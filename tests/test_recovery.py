@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.container import recovery as recovery_blocks
-from mcz.container.recovery import Shape, build_packet, read_packet, shape_for
+from mcz.container.recovery import Shape, build_packet, protected_shapes, read_packet, shape_for
 from mcz.container.recovery.code import (
     divide,
     encode_blocks,
@@ -25,7 +25,6 @@ from mcz.container.recovery.code import (
     run_length,
 )
 from mcz.container.source import ByteSource
-from mcz.files.editing.appending import protections
 from mcz.sources.sample import write_samples
 from tests.amounts import amount
 from tests.clocked_files import bvh
@@ -115,7 +114,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 @pytest.fixture(scope="module")
 def shapes(archive: bytes) -> list[Shape]:
     with mcz.open(archive) as file:
-        return [key.shape for key in protections(file.container)]
+        return protected_shapes(file.container)
 
 
 def restore_file(bad: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
@@ -261,15 +260,15 @@ def test_rewriting_in_place_protects_anew(archive: bytes, tmp_path: Path) -> Non
     assert report.left_out == []
     assert report.size == path.stat().st_size
     with mcz.open(path) as file:
-        (key,) = protections(file.container)
-    assert key.shape.stop == path.stat().st_size
+        (shape,) = protected_shapes(file.container)
+    assert shape.stop == path.stat().st_size
     assert mcz.verify(path) == []
     report = mcz.reorder_clips(path, by="-name", output=tmp_path / "b.mcz")
     assert "recovery data" in report.left_out[0]
     mcz.set_metadata(path, {"walk": {"subject": "05"}})
     mcz.set_rate(path, 100, ["walk"], force=True)
     with mcz.open(path) as file:
-        assert protections(file.container)[-1].shape.stop == path.stat().st_size
+        assert protected_shapes(file.container)[-1].stop == path.stat().st_size
     assert mcz.verify(path) == []
 
 
@@ -283,7 +282,7 @@ def test_what_protected_files_are_merged_to_is_protected(archive: bytes, tmp_pat
     assert report.left_out == []
     assert report.size == (tmp_path / "c.mcz").stat().st_size
     with mcz.open(tmp_path / "c.mcz") as file:
-        ((_, shape),) = protections(file.container)
+        (shape,) = protected_shapes(file.container)
     assert (shape.start, shape.stop) == (0, report.size)
     assert shape.n_recovery >= 0.2 * shape.n_blocks  # the greatest share of all
     assert mcz.verify(tmp_path / "c.mcz") == []
@@ -292,7 +291,7 @@ def test_what_protected_files_are_merged_to_is_protected(archive: bytes, tmp_pat
     report = mcz.append([b], a, rename=True)  # which protects what is added
     assert report.left_out == []
     with mcz.open(a) as file:
-        assert protections(file.container)[-1].shape.stop == a.stat().st_size
+        assert protected_shapes(file.container)[-1].stop == a.stat().st_size
 
 
 def test_protecting_twice_does_nothing(archive: bytes, tmp_path: Path) -> None:

@@ -239,7 +239,7 @@ def run_search(
     def measure(target: Target, setting: float) -> float:
         asked.append(setting)
         assert dial.low <= setting <= dial.high
-        assert not dial.whole or isinstance(setting, int)
+        assert not dial.is_integer or isinstance(setting, int)
         return figure(setting)
 
     return *search(dial, Target("figure", limit, falls), measure), asked
@@ -324,8 +324,8 @@ def test_errors_of_the_codec_come_through() -> None:
 
 # Dials that go the other way, and dials of integers
 
-WHOLE = Dial("q", 1, 2**20, rises=True, whole=True)
-COUNTED = Dial("n", 1, 1000, whole=True)
+WHOLE = Dial("q", 1, 2**20, rises=True, is_integer=True)
+COUNTED = Dial("n", 1, 1000, is_integer=True)
 
 
 @given(

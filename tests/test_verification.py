@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 import mcz
 from conformance.manifest import VECTORS, load
 from mcz import codecs
-from mcz.container.checksums import ChecksumReport, check_checksums
 from mcz.container.chunks import FOOT, build_foot
 from mcz.container.index import index_content
 from mcz.container.source import lock, open_source
 from mcz.errors import UnsupportedError
+from mcz.files.reading.faults import ChecksumReport, check_checksums
 from tests import live_codec
 from tests.commands import Call
 from tests.motions import skeleton, smooth, write_bytes

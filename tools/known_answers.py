@@ -38,7 +38,7 @@ def answer_of(codec: Codec) -> KnownAnswer:
     source.layout = answer_layout(codec.grouping)
     encoded = codec.encode(source, options)
     (segment,) = encoded.segments
-    models = (*encoded.models, *encoded.known)
+    models = (*encoded.models, *encoded.known_models)
     header, streams = encoded.header.hex(), tuple(stream.hex() for stream in segment.streams)
     coded = tuple((model.kind, model.data.hex()) for model in models)
     version = codec.version if encoded.version is None else encoded.version

@@ -157,7 +157,7 @@ def codec_calls(
         return encoded, list(encoded.segments)
 
     encoded, segments = encode()
-    find_model = model_finder((*encoded.models, *encoded.known))
+    find_model = model_finder((*encoded.models, *encoded.known_models))
 
     def decode() -> None:
         layout = MemorySource(stored_motion, 0, codec, BASE.segment_bytes, options).layout
@@ -193,7 +193,7 @@ class Settings:
     """The range of a dial: whole numbers only for a parameter of integers."""
 
     def __init__(self, dial: Dial) -> None:
-        self.low, self.high, self.whole = dial.low, dial.high, dial.whole
+        self.low, self.high, self.whole = dial.low, dial.high, dial.is_integer
 
     def snap(self, setting: float) -> float:
         rounded = round(setting) if self.whole else float(f"{setting:.6g}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from mcz.cli.common import Exit, in_options
 from mcz.cli.terminal import echo, plural, print_json, say
-from mcz.files.reading.fidelity import GIVEN_BACK
+from mcz.files.reading.differences import GIVEN_BACK
 
 if TYPE_CHECKING:
     from mcz.files.editing import Outcome, Report

@@ -16,7 +16,7 @@ from mcz.cli.decode_options import (
     PreviewSelection,
 )
 from mcz.cli.outputs import Output
-from mcz.files.reading.fidelity import CONVERTED, RESTORED
+from mcz.files.reading.differences import CONVERTED, RESTORED
 from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
@@ -283,7 +283,7 @@ def _fit_line(fit: Fit) -> str:
 
 def _rate_notes(clip: Clip, part: ClipSelection, options: DecodeOptions) -> tuple[str, ...]:
     """Notes on text files whose stated times differ from the clip's."""
-    from mcz.files.reading.fidelity import text_notes
+    from mcz.files.reading.differences import text_notes
 
     if options.decimate:
         return ()

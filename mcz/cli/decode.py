@@ -36,7 +36,7 @@ from mcz.cli.outputs import (
 )
 from mcz.cli.shared_options import ITS_RATE_HELP
 from mcz.cli.terminal import plural, say
-from mcz.files.reading.fidelity import RESTORED
+from mcz.files.reading.differences import RESTORED
 from mcz.model.types import JsonObject, Settings
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mcz.cli.common import Exit, Failure, errors_about, in_options, open_input, require_file
 from mcz.cli.outputs import CONVERSIONS, SCENES
 from mcz.cli.terminal import say
-from mcz.files.reading.fidelity import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
+from mcz.files.reading.differences import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
 from mcz.model.types import Params, Values
 
 if TYPE_CHECKING:

@@ -98,7 +98,7 @@ def _encode_piped(
     **options: Any,
 ) -> Exit:
     from mcz.cli.standard_input import encode_lines, spool_input
-    from mcz.files.live.text_writer import codes_live
+    from mcz.files.live.generators import codes_live
     from mcz.files.writing.atomic import refuse_inputs
 
     refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))

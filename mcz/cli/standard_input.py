@@ -85,7 +85,7 @@ class InputWaiter(RawIOBase):
 @contextmanager
 def spool_input(format_name: str | None) -> Iterator[str]:
     """The path of a file with all of standard input, within the block."""
-    from mcz.files.live.text_writer import suffix_of
+    from mcz.files.live.generators import suffix_of
 
     data = standard_input().read()
     if not data:
@@ -103,7 +103,7 @@ def encode_lines(
     target: str | None, force: bool, format_name: str | None, skeleton: str | None, **options: Any
 ) -> None:
     """Encode standard input frame by frame to ``target``; - or None is standard output."""
-    from mcz.files.live.text_writer import begin_live
+    from mcz.files.live.generators import begin_live
     from mcz.files.reading.source_files import SourceOptions
     from mcz.files.writing.file import encoding_options
 

@@ -10,7 +10,7 @@ from mcz.container.source import ByteSource
 from mcz.errors import MczError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import Attachment, File
-from mcz.files.reading.source_info import source_facts
+from mcz.files.reading.source_files import source_facts
 from mcz.model.schema import parse
 from mcz.model.text_format import count_text, printable
 from mcz.model.types import JsonObject, Params

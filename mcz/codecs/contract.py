@@ -146,17 +146,17 @@ Fetch = Callable[[int, int, int], bytes]  # (segment, stored resolution, group) 
 class Encoded:
     """An encoded signal: the header in CLIP, then segments, produced lazily.
 
-    ``models`` are written once per file, before the clip that refers to them. ``known`` are those
-    of SPEC.md's annexes that it refers to, which the archive profile stores as well. ``version``:
-    the oldest codec version that reads it (None: the codec's). ``preset``: the preset in CLIP (0:
-    the codec's).
+    ``models`` are written once per file, before the clip that refers to them. ``known_models`` are
+    those of SPEC.md's annexes that it refers to, which the archive profile stores as well.
+    ``version``: the oldest codec version that reads it (None: the codec's). ``preset``: the preset
+    in CLIP (0: the codec's).
     """
 
     header: bytes
     segments: Iterator[Segment]
     n_resolutions: int = 1
     models: tuple[Model, ...] = ()
-    known: tuple[Model, ...] = ()
+    known_models: tuple[Model, ...] = ()
     version: int | None = None
     preset: int = 0
 

@@ -58,16 +58,16 @@ class Parameter:
 class Dial:
     """The one parameter that trades quality for size: the greater, the smaller the file.
 
-    ``rises``: greater means better quality instead. ``whole``: it is an integer. To meet a target
-    size or error, it is searched between ``low`` and ``high``, starting at ``guess`` (target,
-    limit) if that returns a setting.
+    ``rises``: greater means better quality instead. ``is_integer``: settings are integers. To meet
+    a target size or error, it is searched between ``low`` and ``high``, starting at ``guess``
+    (target, limit) if that returns a setting.
     """
 
     parameter: str
     low: float
     high: float
     rises: bool = False
-    whole: bool = False
+    is_integer: bool = False
     guess: Callable[[str, float], float | None] | None = None
 
 

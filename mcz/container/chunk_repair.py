@@ -29,7 +29,7 @@ from mcz.container.limits import BASE, index_limit
 from mcz.container.model_records import build_head, parse_head
 from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
-from mcz.container.scanner import Found
+from mcz.container.scanner import ScanResult
 from mcz.container.source import ByteSource, Overlay
 from mcz.errors import FormatError, MczError
 from mcz.model.schema import build
@@ -37,7 +37,7 @@ from mcz.model.schema import build
 MOST_READ = 4  # times the bytes of a file, in search of a bit
 
 
-def scan_for_salvage(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
+def scan_for_salvage(source: ByteSource) -> tuple[ByteSource, ScanResult, list[str]]:
     """A damaged file with all possible repairs, a salvaging scan of it, and its faults.
 
     Raises FormatError if no chunk is intact.
@@ -54,7 +54,7 @@ def scan_for_salvage(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
     return source, scanned, notes
 
 
-def restore_chunks(source: ByteSource, scanned: Found) -> tuple[Overlay | None, list[str]]:
+def restore_chunks(source: ByteSource, scanned: ScanResult) -> tuple[Overlay | None, list[str]]:
     """``source`` with its damaged chunks restored from copies, None if none can be.
 
     ``scanned`` is the result of a salvaging scan of ``source``. Also returns the fault of each of
@@ -88,7 +88,7 @@ def restore_chunks(source: ByteSource, scanned: Found) -> tuple[Overlay | None, 
     return (Overlay(source, parts) if parts else None), notes
 
 
-def _mend_headers(source: ByteSource, scanned: Found) -> Iterator[tuple[int, bytes]]:
+def _mend_headers(source: ByteSource, scanned: ScanResult) -> Iterator[tuple[int, bytes]]:
     """Headers with a single bit flipped back, with which both checks of the chunk hold."""
     left = MOST_READ * source.size
     for offset, chunk in scanned.broken:
@@ -118,7 +118,7 @@ def _check_whole(source: ByteSource, chunk: Chunk) -> None:
 
 
 def _shift_copies(
-    source: ByteSource, scanned: Found, copies: list[Copy]
+    source: ByteSource, scanned: ScanResult, copies: list[Copy]
 ) -> Iterator[tuple[Copy, int | None]]:
     """Each copy, and the shift of its original from the stated offset.
 
@@ -136,8 +136,8 @@ def _shift_copies(
         near = sorted(abs(at - copy.offset) for at in places.get(key, []))
         ats = [at for at in places.get(key, []) if abs(at - copy.offset) == near[0]]
         known.append(ats[0] - copy.offset if ats else None)
-    before, behind = _fill_forward(known), _fill_forward(known[::-1])[::-1]
-    for copy, own, last, following in zip(copies, known, before, behind, strict=True):
+    before, after = _fill_forward(known), _fill_forward(known[::-1])[::-1]
+    for copy, own, last, following in zip(copies, known, before, after, strict=True):
         around = {shift for shift in (last, following) if shift is not None} or {0}
         yield copy, own if own is not None else around.pop() if len(around) == 1 else None
 
@@ -149,7 +149,7 @@ def _fill_forward(known: list[int | None]) -> list[int | None]:
     return filled
 
 
-def _read_copies(source: ByteSource, scanned: Found, notes: list[str]) -> Iterator[Copy]:
+def _read_copies(source: ByteSource, scanned: ScanResult, notes: list[str]) -> Iterator[Copy]:
     """The copies in every intact COPY; together they are not longer than the file."""
     left = source.size
     for chunk in scanned.chunks:
@@ -164,18 +164,15 @@ def _read_copies(source: ByteSource, scanned: Found, notes: list[str]) -> Iterat
         yield from copies
 
 
-def _sound_spans(scanned: Found) -> list[tuple[int, int]]:
+def _sound_spans(scanned: ScanResult) -> list[tuple[int, int]]:
     feet = [(at, at + FOOT.size) for at in scanned.feet]
-    return sorted(feet + [(chunk.offset, _end_of(chunk, scanned)) for chunk in scanned.chunks])
+    ends = (scanned.ends[c.offset] if c.length is None else c.stop for c in scanned.chunks)
+    return sorted([*feet, *zip((c.offset for c in scanned.chunks), ends, strict=True)])
 
 
 def _overlaps(spans: list[tuple[int, int]], start: int, stop: int) -> bool:
     index = bisect_right(spans, (start, stop))
     return any(a < stop and start < b for a, b in spans[max(0, index - 1) : index + 1])
-
-
-def _end_of(chunk: Chunk, scanned: Found) -> int:
-    return scanned.ends[chunk.offset] if chunk.length is None else chunk.offset + chunk.size
 
 
 def _fault_of(source: ByteSource, copy: Copy) -> str:
@@ -187,7 +184,7 @@ def _fault_of(source: ByteSource, copy: Copy) -> str:
     return ""
 
 
-def owners_of(source: ByteSource, scanned: Found) -> dict[tuple[int, int], str]:
+def owners_of(source: ByteSource, scanned: ScanResult) -> dict[tuple[int, int], str]:
     """Owners of segments and CENDs, from the last intact index; see ``scan``."""
     listed = _read_last_index(source, scanned)
     owners: dict[tuple[int, int], str] = {}
@@ -199,7 +196,7 @@ def owners_of(source: ByteSource, scanned: Found) -> dict[tuple[int, int], str]:
     return owners
 
 
-def _read_last_index(source: ByteSource, scanned: Found) -> Directory | None:
+def _read_last_index(source: ByteSource, scanned: ScanResult) -> Directory | None:
     """The content of the last intact INDX, and of those that it continues up to a damaged one."""
     for chunk in reversed(scanned.chunks):
         if chunk.type == ChunkType.INDX:
@@ -213,7 +210,7 @@ def _read_last_index(source: ByteSource, scanned: Found) -> Directory | None:
     return None
 
 
-def restore_from_index(source: ByteSource, scanned: Found) -> list[str]:
+def restore_from_index(source: ByteSource, scanned: ScanResult) -> list[str]:
     """Restore the lost HEAD and aliases of a salvaged file from the last intact index.
 
     Without an index it gets the HEAD of this version. Returns the lost parts.

@@ -65,6 +65,7 @@ FLAGS_OF: dict[bytes, ChunkFlag] = {  # of chunks that are not critical
 }
 # The chunks repeated by a REPT, and by a COPY.
 REPEATED = (ChunkType.HEAD, ChunkType.SKEL, ChunkType.MODL, ChunkType.CLIP)
+SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)  # named by a hash, for clips to refer to
 COPIED = (*REPEATED, ChunkType.SRCE, ChunkType.ALIA, ChunkType.CEND)
 
 

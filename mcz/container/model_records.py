@@ -114,7 +114,7 @@ def parse_skeleton(fields: payloads.Skel, profile: Profile, where: str) -> Skele
     check(f"{where}: channels", sum(len(j.channels) for j in fields.joints), profile.channels)
     try:
         return Skeleton(
-            joints=tuple(_parse_joint(row, where) for row in fields.joints),
+            joints=tuple(_parse_joint(row) for row in fields.joints),
             name=fields.name,
             unit_cm=fields.unit_cm,
             angle_unit=ANGLE_UNITS[fields.angle_unit],
@@ -128,7 +128,7 @@ def parse_skeleton(fields: payloads.Skel, profile: Profile, where: str) -> Skele
         raise FormatError(str(error), where=where) from None
 
 
-def _parse_joint(row: payloads.Joint, where: str) -> Joint:
+def _parse_joint(row: payloads.Joint) -> Joint:
     return Joint(
         name=row.name,
         parent=row.parent - 1,

@@ -99,7 +99,7 @@ class Container:
         self.feet: list[int] = []  # offsets of FOOTs found by salvage
         self.unverified = 0
         self.runs = DecodedCache()
-        self._said = MetadataCache()
+        self._metadata = MetadataCache()
         self._last_mask = 0, b""  # a segment in a packet, and its mask
         self._skeletons: dict[bytes, tuple[payloads.Skel, Skeleton]] = {}
         self.directory = directory or (self._salvage() if salvage else self._open())
@@ -189,7 +189,7 @@ class Container:
 
     def metadata(self, row: ClipRow) -> dict[str, str]:
         """Metadata of a clip from CLIP, updated by later META chunks."""
-        return apply_records(self._said.of(row, self.payload), self.metadata_records(row.name))
+        return apply_records(self._metadata.of(row, self.payload), self.metadata_records(row.name))
 
     def copies(self) -> list[Chunk]:
         """The COPY chunks of the file, in order."""

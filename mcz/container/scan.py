@@ -29,7 +29,7 @@ from mcz.container.grammar import (
     PacketEvent,
 )
 from mcz.container.parser_drivers import events, repeated_chunks
-from mcz.container.scanner import Found, Scanner
+from mcz.container.scanner import Scanner, ScanResult
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 
@@ -40,7 +40,7 @@ NOBODY: Owners = MappingProxyType({})
 
 def scan(
     source: ByteSource, *, salvage: bool = False, whole: bool = False, owners: Owners = NOBODY
-) -> Found:
+) -> ScanResult:
     """Scan the file; ``owners``: those of segments and CENDs in an index.
 
     ``whole`` also checks the crc of every chunk (salvage always does) and, unless salvaging, the
@@ -59,11 +59,11 @@ def scan(
         for event in events(source, scanner.parser):
             scanner.take(event)
     except TruncatedError as error:
-        feet = scanner.found.feet
+        feet = scanner.result.feet
         error.last_foot = feet[-1] + FOOT.size if feet else None
         raise
     scanner.finish()
-    return scanner.found
+    return scanner.result
 
 
 class Salvager(Scanner):
@@ -87,7 +87,7 @@ class Salvager(Scanner):
                 return
             if self.clip is not None:
                 self._doubt |= event.offset - (self._fault or 0) >= LEAST_BETWEEN
-                self.found.doubts |= self._doubt
+                self.result.doubts |= self._doubt
         if self._is_draining:
             self._drain(event)
         else:
@@ -117,9 +117,9 @@ class Salvager(Scanner):
                 self._take(event)
                 return
         elif isinstance(event, ChunkEvent) and fault.state != INDEX:
-            kind, head = event.chunk.type, self.found.directory.head
+            kind, head = event.chunk.type, self.result.directory.head
             if self.clip is not None and self._is_repeated(event):
-                self.found.chunks.append(event.chunk)
+                self.result.chunks.append(event.chunk)
                 return
             if BODY in GRAMMAR[event.thing]:
                 self._close_clip()  # GRAM-01
@@ -143,16 +143,16 @@ class Salvager(Scanner):
             return False
         payload = event.payload
         if kind == ChunkType.HEAD:
-            return payload == self.found.directory.head
+            return payload == self.result.directory.head
         if kind == ChunkType.CLIP:
             return payload == self._opening
         try:
-            return (kind, chunk_id(kind, payload)) in self.found.directory.shared
+            return (kind, chunk_id(kind, payload)) in self.result.directory.shared
         except FormatError:
             return False
 
     def _note(self, error: FormatError) -> None:
-        self.found.damage.append(str(error))
+        self.result.damage.append(str(error))
         if self.clip is not None:
             self.clip.damage.append(str(error))
 
@@ -163,7 +163,7 @@ class Salvager(Scanner):
             self.parser.is_done and fault and isinstance(fault.error, LimitError)
         ):
             return  # the signature, or the end of an exhausted search
-        self.found.broken.append((event.offset if chunk is None else chunk.offset, chunk))
+        self.result.broken.append((event.offset if chunk is None else chunk.offset, chunk))
         if isinstance(inner, FootEvent):
             self._search(inner.offset, inner.offset + 1)
         elif inner is not None and _is_inside(inner):
@@ -236,14 +236,14 @@ class Salvager(Scanner):
 
     def _repeat(self, chunk: Chunk, payload: bytes) -> None:
         """Use the chunks of a REPT: of the open clip, those that may have been lost."""
-        directory = self.found.directory
+        directory = self.result.directory
         if self._doubt and not self._settle_doubt(payload, chunk.offset):
             self._close_clip()
         if self.clip is None:
             for inner in repeated_chunks(payload, chunk.payload_offset):
                 if inner.thing != "HEAD" or not directory.head:
                     self._handlers[inner.thing](inner.chunk, inner.payload)
-        elif self.found.damage:
+        elif self.result.damage:
             with suppress(FormatError):  # a bad REPT is skipped
                 for inner in repeated_chunks(payload, chunk.payload_offset):
                     if inner.thing in ("SKEL", "MODL"):
@@ -264,8 +264,8 @@ class Salvager(Scanner):
 
     def finish(self) -> None:
         self._close_clip()
-        if not self.found.feet:
-            self.found.damage.append("the file has no valid FOOT")
+        if not self.result.feet:
+            self.result.damage.append("the file has no valid FOOT")
 
 
 def _is_inside(event: Event) -> bool:

@@ -172,7 +172,7 @@ Payloads = Callable[[Chunk], bytes]
 
 
 @dataclass(slots=True)
-class Found:
+class ScanResult:
     """The result of a scan."""
 
     directory: Directory = field(default_factory=Directory)
@@ -196,7 +196,7 @@ class Scanner:
         self, size: int | None, *, whole: bool = True, payload_of: Payloads | None = None
     ) -> None:
         self.parser = Parser(size, want=self._needed_bytes, check=whole)
-        self.found = Found()
+        self.result = ScanResult()
         self.strict = whole
         self.clip: ClipRow | None = None
         self.first: list[int] = []  # the next frame of each signal of the open clip
@@ -242,39 +242,39 @@ class Scanner:
         if isinstance(event, PacketEvent):
             self._packet(event)
         elif isinstance(event, FootEvent):
-            self.found.feet.append(event.offset)
-            self.found.directory.end = event.end
+            self.result.feet.append(event.offset)
+            self.result.directory.end = event.end
         elif event.chunk.length is not None:
             chunk, is_read = event.chunk, event.payload or not event.chunk.length
             if self.parser.profile.is_plain and is_read and chunk.type != ChunkType.DATA:
                 check_plain(chunk.type, event.payload, chunk.label)
             self._handlers[event.thing](chunk, event.payload)
-            self.found.chunks.append(event.chunk)
+            self.result.chunks.append(event.chunk)
 
     def finish(self) -> None:
         """Note that nothing follows."""
 
     def forget(self) -> None:
         """Drop the places of chunks and segments, which are useless in a stream."""
-        self.found.chunks.clear()
-        self.found.ends.clear()
+        self.result.chunks.clear()
+        self.result.ends.clear()
         if self.clip is not None:
             self.clip.segments.clear()
 
     def _head(self, chunk: Chunk, payload: bytes) -> None:
         self.parser.profile = parse_head(payload)
-        self.found.directory.head = payload
+        self.result.directory.head = payload
 
     def _shared(self, chunk: Chunk, payload: bytes) -> None:
         plain = plain_payload(chunk.type, payload, chunk.label, self.parser.profile)
         id_ = plain_id(chunk.type, plain)
         if self.strict:
             self._check_shared(chunk, id_, plain)
-        self.found.directory.shared.setdefault((chunk.type, id_), chunk)  # GRAM-05
+        self.result.directory.shared.setdefault((chunk.type, id_), chunk)  # GRAM-05
 
     def _check_shared(self, chunk: Chunk, id_: bytes, plain: bytes) -> None:
         if chunk.type == ChunkType.SKEL:
-            directory = self.found.directory
+            directory = self.result.directory
             # ALIA-01
             if check_skeleton(plain, chunk.label, directory, self._templates, self.parser.profile):
                 self._sourced.add((payloads.OF_SKELETON, id_))
@@ -292,7 +292,7 @@ class Scanner:
 
     def _attachment(self, chunk: Chunk, payload: bytes) -> None:
         fields = parse(payloads.Atta, payload, chunk.label)
-        rows = self.found.directory.attachments
+        rows = self.result.directory.attachments
         if self.strict:
             check_path(fields.name, chunk.label)
         # ATTA-01, GRAM-07
@@ -312,16 +312,16 @@ class Scanner:
 
     def _alias(self, chunk: Chunk, payload: bytes) -> None:
         fields = parse(payloads.Alia, payload, chunk.label)
-        if fields.name in self.found.directory.aliases:  # GRAM-08
+        if fields.name in self.result.directory.aliases:  # GRAM-08
             raise FormatError(f"chunk {chunk.label}: a second alias {fields.name!r}")
         if self.strict:
             check_path(fields.name, chunk.label)
             check_target(fields, chunk.label, self._sourced)
-        self.found.directory.aliases[fields.name] = (fields.of, fields.target)
+        self.result.directory.aliases[fields.name] = (fields.of, fields.target)
 
     def _begin_clip(self, chunk: Chunk, payload: bytes) -> None:
-        fields = parse_clip(payload, self.found.directory.head, chunk.label)
-        if not fields.name or fields.name in self.found.directory.clips:  # CLIP-01, GRAM-06
+        fields = parse_clip(payload, self.result.directory.head, chunk.label)
+        if not fields.name or fields.name in self.result.directory.clips:  # CLIP-01, GRAM-06
             raise FormatError(
                 f"chunk {chunk.label}: clip name {fields.name!r} is empty or already used"
             )
@@ -330,7 +330,7 @@ class Scanner:
         # LIMIT-18
         check(f"chunk {chunk.label}: signals", len(fields.signals), self.parser.profile.signals)
         if self.strict and check_clip(
-            fields, chunk.label, self.found.directory, self._templates
+            fields, chunk.label, self.result.directory, self._templates
         ):  # ALIA-02
             self._sourced.add((payloads.OF_CLIP, fields.name.encode()))
         self.clip = ClipRow.of(fields, chunk)
@@ -351,8 +351,8 @@ class Scanner:
                 self._mask_row = row
             self._segment(row)
             return
-        self.found.ends[event.chunk.offset] = event.end
-        self.found.chunks.append(event.chunk)
+        self.result.ends[event.chunk.offset] = event.end
+        self.result.chunks.append(event.chunk)
 
     def _segment(self, row: SegmentRow) -> None:
         header, at = row.header, row.offset - HEADER.size
@@ -383,7 +383,7 @@ class Scanner:
         """End the open clip; return the faults of its signals."""
         clip, self.clip = self.clip, None
         assert clip is not None
-        self.found.directory.clips[clip.name] = clip
+        self.result.directory.clips[clip.name] = clip
         stored = [row.stored(clip.n_frames) for row in clip.signals]
         return [
             FormatError(f"clip {clip.name!r}: signal {signal} has {frames} frames; expected {due}")
@@ -394,12 +394,12 @@ class Scanner:
     def _index(self, chunk: Chunk, payload: bytes) -> None:
         if self.strict and self._size is not None:  # STRICT-04
             limit = index_limit(self._size)
-            self._indexes.check(payload, chunk, self.found.directory, limit)  # INDX-02, STRICT-04
+            self._indexes.check(payload, chunk, self.result.directory, limit)  # INDX-02, STRICT-04
 
     def _ancillary(self, chunk: Chunk, payload: bytes) -> None:
         if self.strict:
             self._check_ancillary(chunk, payload)
-        last = self.found.directory.clips.last
+        last = self.result.directory.clips.last
         if self.clip is None and last is not None:
             last.ancillary.append(chunk)
 
@@ -408,5 +408,5 @@ class Scanner:
             raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
         size = chunk.offset + chunk.size if self._size is None else self._size
         check_ancillary(
-            chunk, payload, size, self.found.directory, self.found.chunks, self._payload_of
+            chunk, payload, size, self.result.directory, self.result.chunks, self._payload_of
         )

@@ -147,11 +147,11 @@ def check_bag(
 
 class _BagValidator:
     def __init__(self, check: BagCheck, progress: Callable[[int, int, str], object] | None) -> None:
-        self.found, self.progress = check, progress
+        self.check, self.progress = check, progress
         self.encoding = "utf-8"
 
     def run(self) -> None:
-        check = self.found
+        check = self.check
         self._read_declaration()
         check.files = sorted(self._list_files(PAYLOAD))
         payload, tags = self._read_manifests()
@@ -165,10 +165,10 @@ class _BagValidator:
             self._fault("fetch.txt: the bag has files elsewhere; fetch them first")
 
     def _fault(self, text: str) -> None:
-        self.found.problems.append(text)
+        self.check.problems.append(text)
 
     def _text(self, name: str) -> str:
-        data = (self.found.folder / name).read_bytes()
+        data = (self.check.folder / name).read_bytes()
         try:
             return data.decode("utf-8-sig" if self.encoding == "utf-8" else self.encoding)
         except UnicodeDecodeError as error:
@@ -184,20 +184,20 @@ class _BagValidator:
 
     def _read_declaration(self) -> None:
         tags = dict(self._tags(DECLARATION))
-        self.found.version = tags.get("BagIt-Version", "")
-        if self.found.version not in VERSIONS:
-            self._fault(f"{DECLARATION}: BagIt-Version {self.found.version!r} is not known")
+        self.check.version = tags.get("BagIt-Version", "")
+        if self.check.version not in VERSIONS:
+            self._fault(f"{DECLARATION}: BagIt-Version {self.check.version!r} is not known")
         encoding = tags.get("Tag-File-Character-Encoding", "")
         try:
             "".encode(encoding or "none")
             self.encoding = encoding.lower()
         except LookupError:
             self._fault(f"{DECLARATION}: Tag-File-Character-Encoding {encoding!r} is not known")
-        if (self.found.folder / INFO).is_file():
-            self.found.info = self._tags(INFO)
+        if (self.check.folder / INFO).is_file():
+            self.check.info = self._tags(INFO)
 
     def _list_files(self, name: str) -> Iterable[str]:
-        root = self.found.folder
+        root = self.check.folder
         if not (root / name).is_dir():
             self._fault(f"no folder {name}")
         for folder, _, names in os.walk(root / name):
@@ -208,7 +208,7 @@ class _BagValidator:
         """The digests that the manifests state, by algorithm and path: of payload and of tags."""
         payload: dict[str, dict[str, str]] = {}
         tags: dict[str, dict[str, str]] = {}
-        for name in sorted(path.name for path in self.found.folder.iterdir()):
+        for name in sorted(path.name for path in self.check.folder.iterdir()):
             matched = _MANIFEST.fullmatch(name)
             if matched is None:
                 continue
@@ -233,8 +233,8 @@ class _BagValidator:
 
     def _check_listing(self, payload: dict[str, dict[str, str]]) -> None:
         """Check that every file is in every manifest, before version 1.0 in one of them."""
-        everywhere = self.found.version == "1.0"
-        for path in self.found.files:
+        everywhere = self.check.version == "1.0"
+        for path in self.check.files:
             absent = [name for name, rows in payload.items() if path not in rows]
             if absent and (everywhere or len(absent) == len(payload)):
                 self._fault(f"{path} is not in manifest-{absent[0]}.txt")
@@ -248,7 +248,7 @@ class _BagValidator:
         for done, (path, digest_of) in enumerate(stated.items()):
             if self.progress is not None:
                 self.progress(done, len(stated), path)
-            file = self.found.folder / path
+            file = self.check.folder / path
             if not file.is_file():
                 self._fault(f"{path} is missing")
                 continue
@@ -257,7 +257,7 @@ class _BagValidator:
                     self._fault(f"{path}: its {algorithm} is {digest}, not {digest_of[algorithm]}")
 
     def _check_oxum(self) -> None:
-        check = self.found
+        check = self.check
         check.n_bytes = sum((check.folder / path).stat().st_size for path in check.files)
         oxum = f"{check.n_bytes}.{len(check.files)}"
         for name, value in check.info:

@@ -23,7 +23,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager, suppress
 from contextvars import ContextVar
-from functools import partial
+from functools import cache, partial
 from queue import SimpleQueue
 from threading import Lock
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TypeVar, cast
@@ -105,11 +105,6 @@ def useful_jobs(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
     return max(DEFAULT_JOBS, min(_LIMIT.get() or DEFAULT_JOBS, n_items))
 
 
-def threads_each(jobs: int) -> int:
-    """Threads of each of ``jobs`` processes: together as many as one process would use."""
-    return max(1, threads.thread_limit() // jobs)
-
-
 AHEAD = 2  # items in work or done, for each process: a bounded queue
 TRIES = 2
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
@@ -120,9 +115,8 @@ class Pool:
 
     def __init__(self, jobs: int, state: object = None) -> None:
         self.jobs = jobs
-        self._first = pickle.dumps(
-            (threads_each(jobs), pickle.dumps(state, pickle.HIGHEST_PROTOCOL))
-        )
+        n_threads = max(1, threads.thread_limit() // jobs)  # of each: together as many as of one
+        self._first = pickle.dumps((n_threads, pickle.dumps(state, pickle.HIGHEST_PROTOCOL)))
         self._free: SimpleQueue[Worker | None] = SimpleQueue()
         for _ in range(jobs):
             self._free.put(None)  # started on its first work
@@ -298,27 +292,13 @@ def main() -> None:
 
     n_threads, packed = pickle.loads(first)
     with limit_threads(n_threads):
-        state = State(packed)
+        state = cache(partial(pickle.loads, packed))  # of all calls; the first may raise its error
         with suppress(BrokenPipeError):  # it was killed, and needs no answer
             while (message := receive(sys.stdin.buffer)) is not None:
                 send(replies, _reply_to(state, message))
 
 
-class State:
-    """State of all calls, unpickled on the first, which may raise its error."""
-
-    def __init__(self, packed: bytes) -> None:
-        self._packed: bytes | None = packed
-        self._value: object = None
-
-    def __call__(self) -> Any:
-        if self._packed is not None:
-            self._value = pickle.loads(self._packed)
-            self._packed = None
-        return self._value
-
-
-def _reply_to(state: State, message: bytes) -> bytes:
+def _reply_to(state: Callable[[], object], message: bytes) -> bytes:
     try:
         function, item = pickle.loads(message)
         return pickle.dumps((True, function(state(), item)), pickle.HIGHEST_PROTOCOL)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.source_info import recording as recording_of
+from mcz.files.reading.source_files import recording as recording_of
 from mcz.files.tables import channel_names, channel_units
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.frames import MotionLike, scale_to, values_of

@@ -11,7 +11,7 @@ import pytest
 
 import mcz
 from mcz import live_frames
-from mcz.files.live.generators import StrictFrames
+from mcz.files.live.clip_state import StrictFrames
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.writing.file import EncodingOptions
 from mcz.sources import FORMATS
@@ -309,8 +309,8 @@ def test_nothing_is_kept_that_was_used() -> None:
     for _ in reader.frames():
         assert reader.scanner.clip is not None
         assert len(reader.scanner.clip.segments) == 1
-        assert len(reader.scanner.found.chunks) <= 1
-    assert reader.scanner.found.chunks == []
+        assert len(reader.scanner.result.chunks) <= 1
+    assert reader.scanner.result.chunks == []
 
 
 def test_frames_that_did_not_come_are_remarked(tmp_path: Path) -> None:

@@ -125,11 +125,11 @@ class Direct:
         coded: Encoded = self.codec.encode(source, self.codec.options(params))
         self.header = coded.header
         self.segments: list[Segment] = list(coded.segments)
-        self.models = coded.models, coded.known
+        self.models = coded.models, coded.known_models
         self.layout: Layout = replace(
             source.layout,
             n_resolutions=coded.n_resolutions,
-            find_model=model_finder((*coded.models, *coded.known)),
+            find_model=model_finder((*coded.models, *coded.known_models)),
         )
         self.spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in self.segments]
 

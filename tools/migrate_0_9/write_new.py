@@ -16,13 +16,13 @@ import numpy as np
 import mcz
 from mcz.codecs import codec_by_name
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.limits import BASE, LARGE
 from mcz.container.metadata import Record
 from mcz.container.model_records import value_hash
 from mcz.container.writer import Writer
 from mcz.files.editing.unpacking import named_files
-from mcz.files.writing.clip_writer import write_clip, write_skeleton
-from mcz.files.writing.quality import CHUNK, quality_payload
+from mcz.files.writing.clip_writer import quality_payload, write_clip, write_skeleton
 from mcz.model.clock import TOLERANCE, Timeline, check_numbers, numbers_or_rows
 from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
@@ -195,7 +195,7 @@ class Migration:
         kept = clip["codec"] if clip["codec"] in KEPT else "fast"
         write_clip(self.writer, motion, codec_by_name(self.codec or kept), {})
         if clip["quality"] is not None:
-            self.writer.ancillary(CHUNK, quality_payload(clip["quality"]))
+            self.writer.ancillary(ChunkType.QUAL, quality_payload(clip["quality"]))
         if clip["file"] is not None and motion.source is None:
             self._as_attachment(clip)
 

@@ -74,7 +74,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     writer = _Writer(header, layout, parameters)
     preset = PRESET_IDS[params["preset"]]
     coded = _segments(source, writer)
-    return Encoded(header, coded, models=choice.models, known=choice.known, preset=preset)
+    return Encoded(header, coded, models=choice.models, known_models=choice.known, preset=preset)
 
 
 def _header(space: SpaceFields, order: int, parameters: Params) -> OnlineHeader:

@@ -160,7 +160,7 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     grouping="all",
-    dial=Dial("q", 1, 2**20, rises=True, whole=True),
+    dial=Dial("q", 1, 2**20, rises=True, is_integer=True),
     parameters=(
         preset_parameter(PRESETS),
         Parameter("q", None, "components of a segment; default 20", integer("q", 1, 2**20)),

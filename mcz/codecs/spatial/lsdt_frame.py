@@ -91,7 +91,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
         fields.code = fields_of(_vectors(coder, source, length))
         coder = _Coder(build(fields, f"{NAME} header"), layout, chosen["threshold"])
     segments = _segments(source, coder, length)
-    return Encoded(coder.header, segments, models=choice.models, known=choice.known)
+    return Encoded(coder.header, segments, models=choice.models, known_models=choice.known)
 
 
 def _vectors(coder: _Coder, source: SignalSource, length: int) -> Iterator[Ints]:

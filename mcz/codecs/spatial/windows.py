@@ -110,7 +110,7 @@ def encode(name: str, source: SignalSource, plan: Plan) -> Encoded:
     header = build(fields, f"{name} header")
     codes = codes_from(parse(WindowsHeader, header, name).code, name)
     segments = _segments(source.layout, quantizer.windows(), plan, quantizer.space.starts, codes)
-    return Encoded(header, segments, models=plan.models, known=plan.known)
+    return Encoded(header, segments, models=plan.models, known_models=plan.known)
 
 
 class _Quantizer:

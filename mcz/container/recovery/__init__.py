@@ -21,8 +21,10 @@ import construct
 import numpy as np
 from construct import Int8ul, Int32ul, Int64ul
 
-from mcz.container.chunks import FRAMING, HEADER
+from mcz.container.chunks import FRAMING, HEADER, Chunk, ChunkType
+from mcz.container.reader import Container
 from mcz.container.recovery.code import LANE, MOST_POINTS, encode_blocks, run_length
+from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.errors import AccessError, FormatError, LimitError, OptionError, reason_of
 from mcz.model.schema import Exactly, Record, bounded, build, field, parse_until
@@ -119,13 +121,13 @@ class Shape:
         """Offset in the file and size of the pieces of a data block, without padding."""
         first = block * self.block_size
         stop = min(first + self.block_size, self.size)
-        behind = self.chunk_size + self.start
+        shift = self.chunk_size + self.start
         ranges = []
         if first < self.a_size:
             ranges.append((self.start + first, min(stop, self.a_size) - first))
         if stop > self.a_size:
             own = max(first, self.a_size)
-            ranges.append((behind + own, stop - own))
+            ranges.append((shift + own, stop - own))
         return ranges
 
     def block(self, number: int, read: Callable[[int, int], bytes]) -> bytes:
@@ -347,3 +349,43 @@ def _lane_reader(
         return result
 
     return rows
+
+
+def recovery_chunks(container: Container) -> list[Chunk]:
+    """The RECV chunks of a file; without a clip no index lists them, and the file is walked."""
+    if container.directory.clips:
+        return container.directory.clips.ancillary(ChunkType.RECV)
+    return [chunk for chunk in scan(container.source).chunks if chunk.type == ChunkType.RECV]
+
+
+def shape_in(source: ByteSource, chunk: Chunk) -> Shape:
+    """The shape that the first packet of a RECV chunk states, unchecked; raises FormatError."""
+    first = read_packet(source, chunk.payload_offset)
+    if first is None:
+        raise FormatError("its first packet is damaged", where=f"chunk {chunk.label}")
+    return first[0].shape
+
+
+def check_protection(source: ByteSource, chunk: Chunk) -> str:
+    """Compare a RECV chunk with the bytes that it protects, and name these; raises FormatError."""
+    shape = shape_in(source, chunk)
+    sizes = shape.chunk_offset, shape.payload_size
+    if sizes != (chunk.offset, chunk.length) or shape.stop > source.size:
+        raise FormatError(
+            f"it protects {shape}, not the bytes before and after it", where=f"chunk {chunk.label}"
+        )
+    _, packets = encode_packets(shape, lambda block: shape.block(block, source.read))
+    at = chunk.payload_offset
+    for packet in packets:
+        if source.read(at, len(packet)) != packet:
+            raise FormatError(
+                f"the packet at {at} does not match the protected bytes",
+                where=f"chunk {chunk.label}",
+            )
+        at += len(packet)
+    return f"bytes {shape.start} to {shape.stop}"
+
+
+def protected_shapes(container: Container) -> list[Shape]:
+    """The shapes of the RECV chunks of a file, in its order, unchecked."""
+    return [shape_in(container.source, chunk) for chunk in recovery_chunks(container)]

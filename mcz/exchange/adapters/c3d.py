@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion import convert
-from mcz.files.reading.source_info import ANALOG, recording
+from mcz.files.reading.source_files import ANALOG, recording
 from mcz.model.extras import import_extra
 from mcz.model.motion import Motion, Signal
 from mcz.sources import FORMATS

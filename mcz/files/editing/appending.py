@@ -31,7 +31,7 @@ from mcz.container.chunks import (
 from mcz.container.directory import Directory
 from mcz.container.index import build_index
 from mcz.container.reader import Container
-from mcz.container.recovery import Key, Shape, Step, encode_packets, read_packet, shape_for
+from mcz.container.recovery import Shape, Step, encode_packets, protected_shapes, shape_for
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource, locked_file
 from mcz.errors import (
@@ -42,7 +42,6 @@ from mcz.errors import (
     TruncatedError,
     UnsupportedError,
 )
-from mcz.files.reading.faults import recovery_chunks
 from mcz.model.schema import parse
 from mcz.model.text_format import fields_text
 
@@ -163,7 +162,7 @@ def _restorable_names(container: Container | None) -> set[str]:
 
 
 def _whole_until(source: ByteSource, start: int) -> int:
-    """End of the last intact thing after ``start``, up to the first fault."""
+    """End of the last intact item after ``start``, up to the first fault."""
     end = at = start or len(SIGNATURE)
     inside = False
     scanned = scan(source, salvage=True)
@@ -180,7 +179,7 @@ def _whole_until(source: ByteSource, start: int) -> int:
 
 
 def _is_last_part(source: ByteSource, chunk: Chunk) -> bool:
-    """Return True if ``chunk`` ends a thing: of an attachment only the last part does."""
+    """Return True if ``chunk`` ends a item: of an attachment only the last part does."""
     if chunk.type != ChunkType.ATTA:
         return True
     fields = parse(payloads.Atta, read_payload(source, chunk, chunk.size), chunk.label)
@@ -215,7 +214,7 @@ def add_recovery(
 ) -> list[Protection]:
     """Append recovery data for unprotected bytes; returns all of the file, in file order."""
     with growing(Path(target), salvage=False, force=False) as growth:
-        protected = [protection_of(key.shape) for key in protections(growth.container)]
+        protected = [protection_of(shape) for shape in protected_shapes(growth.container)]
         start, end = protected[-1].stop if protected else 0, growth.container.directory.end
         if start < end:
             shape = write_recovery(growth.container, growth.added, start, redundancy, progress)
@@ -247,24 +246,10 @@ def protection_of(shape: Shape) -> Protection:
     return Protection(shape.start, shape.stop, *sizes, shape.chunk_size)
 
 
-def protections(container: Container) -> list[Key]:
-    """Keys of the RECV chunks of a file, in its order, unchecked."""
-    keys = []
-    for chunk in recovery_chunks(container):
-        packet = read_packet(container.source, chunk.payload_offset)
-        if packet is None:
-            raise FormatError("its first packet is damaged", where=f"chunk {chunk.label}")
-        keys.append(packet[0])
-    return keys
-
-
 def redundancy_of(container: Container) -> float | None:
     """Redundancy of a file's greatest protected part; None for an unprotected file."""
-    shapes = [key.shape for key in protections(container)]
-    if not shapes:
-        return None
-    greatest = max(shapes, key=lambda shape: shape.size)
-    return min(1.0, greatest.n_recovery / greatest.n_blocks)
+    greatest = max(protected_shapes(container), key=lambda shape: shape.size, default=None)
+    return None if greatest is None else min(1.0, greatest.n_recovery / greatest.n_blocks)
 
 
 def write_recovery(
@@ -275,8 +260,8 @@ def write_recovery(
     shape, tail = _settle(directory, start, end, redundancy)
 
     def read(offset: int, size: int) -> bytes:
-        behind = offset - shape.stop + len(tail)
-        return container.source.read(offset, size) if behind < 0 else tail[behind : behind + size]
+        at = offset - shape.stop + len(tail)  # in the bytes that will follow
+        return container.source.read(offset, size) if at < 0 else tail[at : at + size]
 
     _, packets = encode_packets(shape, lambda block: shape.block(block, read), step)
     for data in chunk_bytes(shape, packets):

@@ -327,7 +327,7 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
 
 
 def _find_superseded(file: File, named: Named) -> tuple[list[str], Said]:
-    """The things from the same paths, and their metadata by path."""
+    """The items from the same paths, and their metadata by path."""
     paths, _ = stored_files(file.container)
     clips = {clip.source.path: clip for clip in file.clips.values() if clip.source is not None}
     old: list[str] = []

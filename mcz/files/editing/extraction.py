@@ -7,7 +7,8 @@ is decoded and encoded again (``recoding.py``), if the caller allows it.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import BinaryIO
@@ -15,8 +16,13 @@ from typing import BinaryIO
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
-from mcz.container.model_records import ValueDigest, value_hash
+from mcz.container.model_records import (
+    ValueDigest,
+    value_hash,
+)
+from mcz.container.reader import Container
 from mcz.container.segments import SegmentHeader
+from mcz.container.source import ByteSource
 from mcz.errors import FormatError, MotionError, OptionError
 from mcz.files.editing.cutting import (
     WITHOUT_SOURCE,
@@ -32,7 +38,7 @@ from mcz.files.editing.cutting import (
 )
 from mcz.files.editing.recoding import (
     OF_JOINTS,
-    check_anew,
+    check_recodable,
     joints_alone,
     settings_of,
     settings_of_joints,
@@ -43,12 +49,11 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where
 from mcz.files.reading.file import File, open
 from mcz.files.reading.signal_reader import SignalReader
-from mcz.files.reading.source_info import stating_rate
+from mcz.files.reading.source_files import stating_rate
 from mcz.files.writing.atomic import replacing_file
-from mcz.files.writing.clip_writer import Amend, check_values
+from mcz.files.writing.clip_writer import Amend, write_plan
 from mcz.files.writing.planning import prepare
-from mcz.files.writing.quality import CHUNK
-from mcz.files.writing.tuning import write_motion
+from mcz.files.writing.tuning import tuned_plan
 from mcz.model.motion import Motion
 from mcz.model.schema import build, parse
 from mcz.model.skeleton import Joints
@@ -133,7 +138,7 @@ def extract(
         cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
         for cut in cuts:
             if cut.is_recoded:
-                check_anew(cut.clip, whole=cut.joints is None)
+                check_recodable(cut.clip, whole=cut.joints is None)
         with replacing_file(target, force=force, inputs=(source,)) as stream:
             copier = Copier(Copying(file, stream, progress, copies))
             copier.run(cuts, alone=alone)
@@ -173,7 +178,7 @@ class Copier(ChunkCopier):
             self.attachments()
         for cut in cuts:
             if cut.is_recoded:
-                self.write_anew(cut)
+                self.write_recoded(cut)
             else:
                 self.write(cut)
         self.aliases({cut.clip.name: cut for cut in cuts}, alone)
@@ -227,7 +232,7 @@ class Copier(ChunkCopier):
         """Write the header, streams and extension of the kept part of a segment."""
         return cut_segment(self.container, part, row, noted=noted)
 
-    def write_anew(self, cut: ClipCut) -> None:
+    def write_recoded(self, cut: ClipCut) -> None:
         """Write the kept part of a clip, decoded and encoded again."""
         clip, old = cut.clip, cut.clip.stored_quality or {}
         motion = replace(joints_alone(cut), name=self.name_of(cut))
@@ -254,9 +259,10 @@ class Copier(ChunkCopier):
         if left_out is not None:
             self.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
         prepared = prepare(motion, codec, settings)
-        record = write_motion(self.writer, prepared, codec, settings, self.progress, amend=amend)
+        plan = tuned_plan(prepared, codec, settings, self.writer.profile)
+        record = write_plan(self.writer, plan, self.progress, amend=amend)
         self.copy_before_cend(row)
-        self.copy_after_cend(row, but=CHUNK)
+        self.copy_after_cend(row, but=ChunkType.QUAL)
         return record or {}
 
     def record_of(self, cut: ClipCut) -> payloads.Clip:
@@ -334,7 +340,7 @@ class Copier(ChunkCopier):
         if self.is_same(cut):
             self.copy_after_cend(row)
             return
-        records = [chunk for chunk in row.ancillary if chunk.type == CHUNK]
+        records = [chunk for chunk in row.ancillary if chunk.type == ChunkType.QUAL]
         record = payloads.Qual(entries=[])
         if records:
             payload = self.container.payload(records[0])
@@ -343,8 +349,8 @@ class Copier(ChunkCopier):
         entries = self.entries(cut, old if records else None)
         if entries is not None:
             record.entries = payloads.metadata_records(entries)
-            self.writer.ancillary(CHUNK, build(record, "quality record"))
-        self.copy_after_cend(row, but=CHUNK)
+            self.writer.ancillary(ChunkType.QUAL, build(record, "quality record"))
+        self.copy_after_cend(row, but=ChunkType.QUAL)
 
     def entries(self, cut: ClipCut, old: Mapping[str, str] | None) -> dict[str, str] | None:
         """Entries of the new quality record from the old ones; None: no record."""
@@ -372,7 +378,7 @@ class Copier(ChunkCopier):
         )
 
     def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
-        """Copy the aliases of things that were copied unchanged."""
+        """Copy the aliases of contents that were copied unchanged."""
         for name, (of, target) in self.file.aliases.items():
             if of == payloads.OF_CLIP:
                 cut = cuts.get(target.decode("utf-8", "replace"))
@@ -388,3 +394,14 @@ class Copier(ChunkCopier):
             elif alone:
                 continue
             self.writer.alias(name, of, target)
+
+
+def check_values(stream: BinaryIO, names: Iterable[str]) -> None:
+    """Decode clips of the file in ``stream`` and compare their hashes, before it gets its name."""
+    stream.flush()
+    container = Container(ByteSource(stream), max_decoded=2**53)
+    for name in names:
+        clip = Clip(container, container.directory.clips[name])
+        for info in clip.signals:
+            clip.check_values(info.index)
+    stream.seek(0, os.SEEK_END)

@@ -239,10 +239,7 @@ def files_below(root: Path, target: Target | None) -> tuple[list[Path], list[Out
             elif not path.is_dir():
                 add_outcome(path, "skipped", "neither a file nor a folder")
 
-    def key(name: str) -> bytes:
-        return os.fsencode(name)
-
-    files.sort(key=lambda path: key(path.relative_to(root).as_posix()))
+    files.sort(key=lambda path: os.fsencode(path.relative_to(root).as_posix()))
     return files, others
 
 

@@ -33,13 +33,13 @@ from mcz.files.editing.rewriting import (
     SKELETON,
     UNPROTECTED,
     Change,
+    Item,
     Plan,
-    Thing,
-    copy_things,
+    copy_items,
+    items_in,
     path_of,
     plan_whole,
     steps,
-    things_in,
     writer_like,
 )
 from mcz.files.editing.unpacking import Content
@@ -66,7 +66,7 @@ def merge(
     """Put the contents of several MCZ files into one, clips in the order of the files.
 
     A name that two of them have, or a path that both restore, is refused. ``skip_identical``: a
-    thing with the same content in both is copied once. ``rename``: the later one is put below the
+    item with the same content in both is copied once. ``rename``: the later one is put below the
     name of its file, "walk" of day2.mcz becomes "day2/walk", and so does its source. Equal files of
     skeletons under one name are always copied once. Raises OptionError, which names the duplicates;
     nothing is left under the target's name then.
@@ -112,11 +112,11 @@ def add_files(
     Raises as ``merge``.
     """
     # Newly written content is unique: it cannot be read yet.
-    there: dict[Thing, Callable[[], object]] = dict.fromkeys(
-        things_in(transaction.writer.directory), object
+    there: dict[Item, Callable[[], object]] = dict.fromkeys(
+        items_in(transaction.writer.directory), object
     )
     merging = Merger(rename, skip_identical, there)
-    merging.things |= {thing: _content(before, thing) for thing in things_in(before)}
+    merging.known |= {item: _content(before, item) for item in items_in(before)}
     merging.paths.update(transaction.paths)
 
     def kept(done: int, total: int, name: str) -> None:
@@ -133,13 +133,13 @@ def add_files(
 class Merger:
     """Files that are merged, and the contents of the new file up to now.
 
-    ``things`` identify the content of each, ``paths`` are those of all files that it restores.
+    ``known`` identifies the content of each item, ``paths`` are those of all restored files.
     ``rename`` and ``skip_identical`` are those of ``merge``.
     """
 
     rename: bool
     skip_identical: bool
-    things: dict[Thing, Callable[[], object]] = field(default_factory=dict)
+    known: dict[Item, Callable[[], object]] = field(default_factory=dict)
     paths: set[str] = field(default_factory=set)
     report: Report = field(default_factory=Report)
 
@@ -160,54 +160,54 @@ class Merger:
     def _plan_file(self, file: File, double: list[str]) -> Plan:
         """Plan the parts of ``file`` to copy; refused names are added to ``double``."""
         plan = plan_whole(file)
-        for thing in list(plan.things):
-            kind, name = thing
-            there = self.things.get(thing)
+        for item in list(plan.changes):
+            kind, name = item
+            there = self.known.get(item)
             of_skeleton = kind == ALIAS and file.alias_of(name).kind == SKELETON
             may_skip = there is not None and (self.skip_identical or of_skeleton)
             new = ""
-            if there is not None and may_skip and there() == _content(file, thing)():
-                del plan.things[thing]  # aliases refer to the present one
+            if there is not None and may_skip and there() == _content(file, item)():
+                del plan.changes[item]  # aliases refer to the present one
                 new, result = "the same content", "present"
-            elif there is None and path_of(file, thing) not in self.paths:
+            elif there is None and path_of(file, item) not in self.paths:
                 result = "copied"
             elif self.rename:
-                new, result = self._free_name(file, thing), "renamed"
-                path = path_of(file, thing) if kind == CLIP else ""
-                plan.things[thing] = Change(new, new.removesuffix(name) + path if path else None)
+                new, result = self._free_name(file, item), "renamed"
+                path = path_of(file, item) if kind == CLIP else ""
+                plan.changes[item] = Change(new, new.removesuffix(name) + path if path else None)
             else:
                 double.append(f"{kind} {quote_name(name)}")
                 continue
             self.report.outcomes.append(Outcome(name, result, 0, new))
-        for thing, change in plan.things.items():
-            self.things[thing[0], change.name or thing[1]] = _content(file, thing)
-            if path := path_of(file, thing, change):
+        for item, change in plan.changes.items():
+            self.known[item[0], change.name or item[1]] = _content(file, item)
+            if path := path_of(file, item, change):
                 self.paths.add(path)
         return plan
 
-    def _free_name(self, file: File, thing: Thing) -> str:
-        kind, name = thing
+    def _free_name(self, file: File, item: Item) -> str:
+        kind, name = item
         stem = PurePosixPath(file.name.replace("\\", "/")).stem or "file"
         folders = (stem if n == 1 else f"{stem}~{n}" for n in count(1))
         return next(
             new
             for new in (f"{folder}/{name}" for folder in folders)
-            if (kind, new) not in self.things and new not in self.paths
+            if (kind, new) not in self.known and new not in self.paths
         )
 
     def carry(
         self, plans: Sequence[tuple[File, Plan]], writer: Writer, progress: Progress | None
     ) -> None:
         """Copy the planned parts of the files."""
-        step = steps(progress, sum(len(plan.things_of(CLIP)) for _, plan in plans))
+        step = steps(progress, sum(len(plan.changes_of(CLIP)) for _, plan in plans))
         for file, plan in plans:
-            left_out = copy_things(file, writer, plan, step)
+            left_out = copy_items(file, writer, plan, step)
             self.report.left_out += [f"{file.name}: {text}" for text in left_out]
 
 
-def _content(file: File, thing: Thing) -> Callable[[], object]:
-    """A finder of the content of a thing, equal for two that can replace each other."""
-    kind, name = thing
+def _content(file: File, item: Item) -> Callable[[], object]:
+    """A finder of the content of a item, equal for two that can replace each other."""
+    kind, name = item
     if kind == ALIAS:
         return _alias_content(file, name)
     return partial(_clip_content if kind == CLIP else _attachment_content, file, name)
@@ -328,14 +328,14 @@ def join_part(part: Part, transaction: WriteTransaction, clip: str) -> None:
     directory = transaction.writer.directory
     with open(part.data) as file:
         plan = plan_whole(file)
-        for kind, name in list(plan.things):
+        for kind, name in list(plan.changes):
             if kind == CLIP and name != clip:
-                plan.things[kind, name] = Change(clip)
+                plan.changes[kind, name] = Change(clip)
             elif (
                 kind == ALIAS and name in directory.aliases and file.alias_of(name).kind == SKELETON
             ):
-                del plan.things[kind, name]
-        copy_things(file, transaction.writer, plan, lambda name: None)
+                del plan.changes[kind, name]
+        copy_items(file, transaction.writer, plan, lambda name: None)
 
 
 def request_parts(
@@ -369,12 +369,5 @@ def encode_ahead(
         return
     asked, profile = request_parts(entries, transaction, seen), transaction.writer.profile
     with answers(encode_part, asked, jobs, profile) as parts:
-        yield join_parts(entries, parts)
-
-
-def join_parts(
-    entries: Iterable[SourceEncoder], parts: Iterable[Answer[Part] | None]
-) -> Iterator[SourceEncoder]:
-    """The entries, with their encoded parts."""
-    for entry, answer in zip(entries, parts, strict=True):
-        yield entry if answer is None else EncodedPart(entry, answer)
+        pairs = zip(entries, parts, strict=True)
+        yield (entry if answer is None else EncodedPart(entry, answer) for entry, answer in pairs)

@@ -26,7 +26,7 @@ from mcz.files.editing.appending import growing, redundancy_of, still_protect
 from mcz.files.editing.rewriting import CLIP, Change, plan_whole, rewriting
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where, list_some, names_of
-from mcz.files.reading.fidelity import states_rate
+from mcz.files.reading.differences import states_rate
 from mcz.files.reading.file import File, open
 from mcz.model.motion import frame_rate_of
 from mcz.model.text_format import cell_text, quote_name, suggest_names
@@ -89,7 +89,7 @@ def _purge(target: str | os.PathLike[str], progress: Progress | None) -> list[st
         plan = plan_whole(job.file)
         plan.drops_meta = True  # META-09
         for clip in job.file:
-            plan.things[CLIP, clip.name] = Change(metadata=clip.metadata)
+            plan.changes[CLIP, clip.name] = Change(metadata=clip.metadata)
         return job.write(plan, Report()).left_out
 
 
@@ -143,7 +143,7 @@ def set_rate(
         report, plan = Report(), plan_whole(file)
         for clip in clips:
             _check_rate(clip, exact, force)
-            plan.things[CLIP, clip.name] = Change(rate=exact)
+            plan.changes[CLIP, clip.name] = Change(rate=exact)
             report.outcomes.append(Outcome(clip.name, "rate", 0, f"{float(exact):g}"))
         if not clips:
             return report

@@ -26,8 +26,8 @@ from mcz.files.editing.cutting import (
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.signal_reader import SignalReader
-from mcz.files.reading.source_info import stating_rate
-from mcz.files.writing.quality import with_values
+from mcz.files.reading.source_files import stating_rate
+from mcz.files.writing.clip_writer import with_values
 from mcz.files.writing.signal_source import MAX_INTEGER, MemorySource, settle
 from mcz.model.motion import Motion, Signal
 from mcz.model.types import Settings
@@ -328,7 +328,7 @@ def _decode_recoded(
 OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may be missing
 
 
-def check_anew(clip: Clip, *, whole: bool = False) -> None:
+def check_recodable(clip: Clip, *, whole: bool = False) -> None:
     """Raise OptionError for a clip that cannot be encoded again; ``whole``: all joints."""
     info = clip.signals[0]
     if info.exact and not (whole and "param.lossless" in (clip.quality or {})):

@@ -305,11 +305,11 @@ def examine(source: ByteSource) -> tuple[Recovery, list[Examined]]:
         bad = (block for block in range(shape.n_blocks) if block not in one.there)
         recovery.bad_bytes += [(at, at + size) for block in bad for at, size in shape.pieces(block)]
     if chain:
-        recovery.behind = _bytes_behind(source, chain[-1])
+        recovery.behind = _bytes_after(source, chain[-1])
     return recovery, chain
 
 
-def _bytes_behind(source: ByteSource, last: Examined) -> int:
+def _bytes_after(source: ByteSource, last: Examined) -> int:
     return max(0, source.size - last.set.shape.stop - last.shift)
 
 
@@ -345,7 +345,7 @@ def recover(
         out.seek(0)
         out.truncate()
         return (recovery if sets else None), 0
-    restorer.copy_unprotected(done.set, _bytes_behind(source, done))
+    restorer.copy_unprotected(done.set, _bytes_after(source, done))
     out.flush()
     return recovery, done.set.shape.stop
 

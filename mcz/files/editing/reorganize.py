@@ -26,15 +26,15 @@ from mcz.files.editing.rewriting import (
     SKELETON,
     UNCHANGED,
     Change,
+    Item,
     Plan,
     Rewriting,
     Shared,
-    Thing,
+    items_in,
     path_of,
     plan_whole,
     rewriting,
     steps,
-    things_in,
 )
 from mcz.files.queries import Value
 from mcz.files.reading.clip import Clip
@@ -69,7 +69,7 @@ def delete_clips(
     """
     with rewriting(target, output, force=force, progress=progress) as job:
         file = job.file
-        named = [_find_thing(file, name) for name in ([names] if isinstance(names, str) else names)]
+        named = [_find_item(file, name) for name in ([names] if isinstance(names, str) else names)]
         if where is not None:
             named += [(CLIP, clip.name) for clip in file.find(where)]
         if not named:
@@ -86,15 +86,15 @@ def delete_clips(
             )
         gone |= dict.fromkeys(others)
         plan = _plan_without(file, gone)
-        what = {thing: thing[0] for kind in KINDS for thing in gone if thing[0] == kind}
-        for thing in things_in(file):
-            if thing not in plan.things:  # with the clips that had the skeleton
-                what.setdefault(thing, "the file of a skeleton that no other clip has")
+        what = {item: item[0] for kind in KINDS for item in gone if item[0] == kind}
+        for item in items_in(file):
+            if item not in plan.changes:  # with the clips that had the skeleton
+                what.setdefault(item, "the file of a skeleton that no other clip has")
         report = Report([Outcome(name, "deleted", 0, reason) for (_, name), reason in what.items()])
         return job.write(plan, report)
 
 
-def _find_thing(file: File, name: str) -> Thing:
+def _find_item(file: File, name: str) -> Item:
     tables: tuple[Collection[str], ...] = (file.clips.rows, file.attachments, file.aliases)
     for kind, table in zip(KINDS, tables, strict=True):
         if name in table:
@@ -104,18 +104,18 @@ def _find_thing(file: File, name: str) -> Thing:
         return CLIP, clips[0]
     if clips:
         raise OptionError(f"{name!r} is ambiguous: {list_some(clips)}; choose one", path=file.name)
-    near = nearest_names(name, [other for _, other in things_in(file)])
+    near = nearest_names(name, [other for _, other in items_in(file)])
     suggestion = f"; did you mean {near}?" if near else ""
     raise OptionError(
         f"no clip, attachment or alias is called {name!r}{suggestion}", path=file.name
     )
 
 
-def _plan_without(file: File, gone: Collection[Thing]) -> Plan:
+def _plan_without(file: File, gone: Collection[Item]) -> Plan:
     """Plan a file without ``gone`` and without anything that only these need."""
     plan = plan_whole(file)
-    plan.things = {thing: UNCHANGED for thing in plan.things if thing not in gone}
-    needed = used_by(file, plan.things_of(CLIP))
+    plan.changes = {item: UNCHANGED for item in plan.changes if item not in gone}
+    needed = used_by(file, plan.changes_of(CLIP))
     lost = used_by(file, [name for kind, name in gone if kind == CLIP])
     of_skeleton = {
         alias: (ChunkType.SKEL, target)
@@ -131,7 +131,7 @@ def _plan_without(file: File, gone: Collection[Thing]) -> Plan:
     plan.shared = [key for key in plan.shared if key not in lost]
     for alias, skeleton in of_skeleton.items():
         if skeleton in lost:
-            plan.things.pop((ALIAS, alias), None)
+            plan.changes.pop((ALIAS, alias), None)
     return plan
 
 
@@ -154,30 +154,30 @@ def rename_clips(
         file, report = job.file, Report()
         plan = plan_whole(file)
         for old, new in names.items():
-            thing = _find_thing(file, old)
+            item = _find_item(file, old)
             check_name(new)
-            plan.things[thing] = _rename_change(file, thing, new)
-            report.outcomes.append(Outcome(thing[1], "renamed", 0, new))
+            plan.changes[item] = _rename_change(file, item, new)
+            report.outcomes.append(Outcome(item[1], "renamed", 0, new))
         _refuse_equal(file, plan)
         return job.write(plan, report)
 
 
-def _rename_change(file: File, thing: Thing, new: str) -> Change:
-    """The change that names a thing ``new``: the path of a clip's source may follow."""
-    path = path_of(file, thing) if thing[0] == CLIP else ""
+def _rename_change(file: File, item: Item, new: str) -> Change:
+    """The change that names a item ``new``: the path of a clip's source may follow."""
+    path = path_of(file, item) if item[0] == CLIP else ""
     suffix = PurePosixPath(path).suffix
-    return Change(new, new + suffix if path and path == thing[1] + suffix else None)
+    return Change(new, new + suffix if path and path == item[1] + suffix else None)
 
 
 def _refuse_equal(file: File, plan: Plan) -> None:
-    """Raise OptionError for two things that would newly have one name."""
-    names = Counter((kind, change.name or name) for (kind, name), change in plan.things.items())
+    """Raise OptionError for two items that would newly have one name."""
+    names = Counter((kind, change.name or name) for (kind, name), change in plan.changes.items())
     for (kind, name), number in names.items():
         if number > 1:
             kinds = "aliases" if kind == ALIAS else f"{kind}s"
             raise OptionError(f"two {kinds} would have the name {quote_name(name)}", path=file.name)
-    before = Counter(path_of(file, thing) for thing in plan.things)
-    after = Counter(path_of(file, thing, change) for thing, change in plan.things.items())
+    before = Counter(path_of(file, item) for item in plan.changes)
+    after = Counter(path_of(file, item, change) for item, change in plan.changes.items())
     for path, number in after.items():
         if path and number > 1 and number > before[path]:
             raise OptionError(f"two files would be restored to {quote_name(path)}", path=file.name)
@@ -208,7 +208,7 @@ def reorder_clips(
         rest = list(file) if by is None else in_order(file, list(file), by)
         clips = dict.fromkeys((CLIP, clip.name) for clip in (*file.clips_called(names), *rest))
         plan = plan_whole(file)
-        plan.things = dict.fromkeys([*clips, *plan.things], UNCHANGED)
+        plan.changes = dict.fromkeys([*clips, *plan.changes], UNCHANGED)
         report = Report([Outcome(name, "moved") for _, name in clips])
         return job.write(plan, report)
 
@@ -306,11 +306,11 @@ def _plan_part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
     shared = [key for key in file.container.directory.shared if key in needed]
     plan = Plan(dict.fromkeys(((CLIP, name) for name in names), UNCHANGED), shared)
     if with_rest:
-        plan.things |= dict.fromkeys(((ATTACHMENT, name) for name in file.attachments), UNCHANGED)
-    kept = {*plan.things}
+        plan.changes |= dict.fromkeys(((ATTACHMENT, name) for name in file.attachments), UNCHANGED)
+    kept = {*plan.changes}
     kept |= {(SKELETON, id_.hex()) for kind, id_ in shared if kind == ChunkType.SKEL}
     others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in kept]
-    plan.things |= dict.fromkeys(others, UNCHANGED)
+    plan.changes |= dict.fromkeys(others, UNCHANGED)
     return plan
 
 

@@ -187,7 +187,7 @@ def write_whole(file: File, stream: BinaryIO, outcome: Repair, progress: Progres
         attempt = Repair(damage=list(damage), recovery=outcome.recovery)
         repairer = Repairer(Copying(file, stream, progress), attempt, degrees)
         cuts = list(_plan_cuts(file, attempt))
-        attempt.lost += _lost_things(file.container)
+        attempt.lost += _lost_parts(file.container)
         repairer.run(cuts, alone=False)
         attempt.size = repairer.writer.offset
         for text in repairer.left_out:
@@ -211,7 +211,7 @@ def _clip_at(repairer: Repairer, offset: int) -> str:
     return next((name for name in reversed(rows) if rows[name].clip.offset <= offset), "")
 
 
-def _lost_things(container: Container) -> Iterator[str]:
+def _lost_parts(container: Container) -> Iterator[str]:
     last = max(container.feet, default=0)
     feet = (parse_foot(container.source.read(at, FOOT.size), at) for at in container.feet)
     indices = {foot.index_offset for foot in feet if foot}
@@ -232,7 +232,7 @@ def _is_foot(container: Container, at: int) -> bool:
 
 
 def _indexed_names(container: Container) -> dict[int, str]:
-    """The names, in a valid index, of the things at each offset; "" for one that is not lost."""
+    """The names, in a valid index, of the parts at each offset; "" for one that is not lost."""
     names: dict[int, str] = {}
     with suppress(FormatError):
         listed = Container(container.source).directory
@@ -265,7 +265,7 @@ def _check_output(stream: BinaryIO, size: int, max_decoded: int) -> list[Problem
 def _plan_cuts(file: File, outcome: Repair) -> Iterator[ClipCut]:
     sound = File(file.container.strictly())
     for name, clip in file.clips.items():
-        problems = clip_problems(sound, sound.clips[name])
+        problems = clip_problems(sound.clips[name])
         # Parts for an unknown codec are intact, though not readable here.
         if not _real_problems(problems) and not (
             problems := problems and _end_problems(sound.clips[name])

@@ -21,11 +21,11 @@ from mcz.container.model_records import value_hash
 from mcz.container.segments import GROUP_NOTES, MASKS, GroupNotes, SegmentHeader
 from mcz.container.source import locked_file
 from mcz.files.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
-from mcz.files.editing.extraction import Copier, Copying
+from mcz.files.editing.extraction import Copier, Copying, check_values
 from mcz.files.editing.recoding import (
     Edited,
     Recoded,
-    check_anew,
+    check_recodable,
     edit,
     is_coded_with_others,
     recode_joint,
@@ -36,8 +36,7 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.files.reading.stored_clip import with_indices
 from mcz.files.writing.atomic import replacing_file
-from mcz.files.writing.clip_writer import check_values
-from mcz.files.writing.quality import figures, texts_of
+from mcz.files.writing.clip_writer import figures, texts_of
 from mcz.model.schema import parse
 from mcz.model.text_format import fields_text
 from mcz.model.types import Progress, Target, Values
@@ -112,7 +111,7 @@ def replace(
         copying = Copying(file, stream, progress, copies)
         editor: _Editor
         if recode and is_coded_with_others(chosen, joint):
-            check_anew(chosen)
+            check_recodable(chosen)
             edited = edit(chosen, joint, values, on_grid)
             editor = _RecodingEditor(copying, chosen, edited)
         else:

@@ -32,11 +32,7 @@ from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, FormatError, OptionError
 from mcz.files.editing import Report
-from mcz.files.editing.appending import (
-    DEFAULT,
-    protect_written,
-    redundancy_of,
-)
+from mcz.files.editing.appending import DEFAULT, protect_written, redundancy_of
 from mcz.files.reading.file import File, open
 from mcz.files.writing.atomic import replacing_file
 from mcz.model.schema import build, parse, parse_until
@@ -265,10 +261,10 @@ def steps(progress: Progress | None, total: int) -> Step:
 
 KINDS = CLIP, ATTACHMENT, ALIAS = "clip", "attachment", "alias"
 SKELETON = "skeleton"
-Thing = tuple[str, str]  # (kind, name); for a skeleton its id in hex is the name
+Item = tuple[str, str]  # (kind, name); for a skeleton its id in hex is the name
 
 
-def things_in(file: File | Directory) -> Iterator[Thing]:
+def items_in(file: File | Directory) -> Iterator[Item]:
     """The named contents of a file, in order."""
     names = (CLIP, file.clips), (ATTACHMENT, file.attachments), (ALIAS, file.aliases)
     return ((kind, name) for kind, names_of in names for name in names_of)
@@ -278,26 +274,26 @@ def things_in(file: File | Directory) -> Iterator[Thing]:
 class Plan:
     """The parts of a file that go into a new one.
 
-    ``things`` are named contents with their changes, clips in their new order. ``shared`` is copied
+    ``changes`` are those of named contents, clips in their new order. ``shared`` is copied
     too, whether a clip needs it or not. ``drops_meta``: META is not copied, for the clips have
     their metadata in CLIP.
     """
 
-    things: dict[Thing, Change] = field(default_factory=dict)
+    changes: dict[Item, Change] = field(default_factory=dict)
     shared: list[Shared] = field(default_factory=list)
     drops_meta: bool = False
 
-    def things_of(self, kind: str) -> dict[str, Change]:
-        """The things of one kind by name."""
-        return {name: change for (its, name), change in self.things.items() if its == kind}
+    def changes_of(self, kind: str) -> dict[str, Change]:
+        """The changes of contents of one kind, by name."""
+        return {name: change for (its, name), change in self.changes.items() if its == kind}
 
 
 def plan_whole(file: File) -> Plan:
     """Plan to copy a file unchanged."""
-    return Plan(dict.fromkeys(things_in(file), UNCHANGED), list(file.container.directory.shared))
+    return Plan(dict.fromkeys(items_in(file), UNCHANGED), list(file.container.directory.shared))
 
 
-def copy_things(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
+def copy_items(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
     """Copy the contents that ``plan`` lists; return what is not copied."""
     copier = ChunkCopier(file.container, writer)
     copier.before_clips()
@@ -306,15 +302,15 @@ def copy_things(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]
             copier.skeleton(id_)
         else:
             copier.shared(kind, id_)
-    for name, change in plan.things_of(ATTACHMENT).items():
+    for name, change in plan.changes_of(ATTACHMENT).items():
         copier.attachment(name, change.name)
-    clips = plan.things_of(CLIP)
+    clips = plan.changes_of(CLIP)
     for name, change in clips.items():
         copier.clip(name, change)
         step(name)
-    for name, change in plan.things_of(ALIAS).items():
+    for name, change in plan.changes_of(ALIAS).items():
         target_kind, target = file.aliases[name]
-        renamed = plan.things.get(file.alias_of(name), UNCHANGED).name
+        renamed = plan.changes.get(file.alias_of(name), UNCHANGED).name
         writer.alias(
             change.name or name, target_kind, target if renamed is None else renamed.encode()
         )
@@ -326,9 +322,9 @@ def copy_things(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]
     return copier.left_out
 
 
-def path_of(file: File, thing: Thing, change: Change = UNCHANGED) -> str:
-    """The path under which a thing is restored; "" if it is not."""
-    kind, name = thing
+def path_of(file: File, item: Item, change: Change = UNCHANGED) -> str:
+    """The path under which a item is restored; "" if it is not."""
+    kind, name = item
     if kind != CLIP:
         return change.name or name
     source = file.container.clip_head(file.container.directory.clips[name]).source
@@ -363,7 +359,7 @@ class Rewriting:
 
     def write(self, plan: Plan, report: Report, step: Step | None = None) -> Report:
         """Write the contents of ``plan``; ``report`` gets the size and what was left out."""
-        step = step or steps(self.progress, len(plan.things_of(CLIP)))
+        step = step or steps(self.progress, len(plan.changes_of(CLIP)))
         in_place = self.output is None
         inputs = () if in_place else (self.target,)
         path = disk_path(self.target) if self.output is None else self.output
@@ -379,7 +375,7 @@ class Rewriting:
     def copy_to(self, stream: BinaryIO, plan: Plan, step: Step) -> list[str]:
         """Write the contents of ``plan`` to ``stream``; return what was left out."""
         writer = writer_like(stream, [self.file])
-        left_out = copy_things(self.file, writer, plan, step)
+        left_out = copy_items(self.file, writer, plan, step)
         writer.finish()
         return left_out
 

@@ -19,11 +19,11 @@ from mcz.container.source import Forward
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.files.editing import Outcome, Report, failure_outcome
 from mcz.files.editing.folders import HIDDEN, Folder, PortableNames, notes_on, set_time, visible
-from mcz.files.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Thing
+from mcz.files.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Item
 from mcz.files.jobs import limit_jobs, share_clips
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where, list_some
-from mcz.files.reading.fidelity import RESTORED, fidelity_of, text_notes
+from mcz.files.reading.differences import RESTORED, fidelity_of, text_notes
 from mcz.files.reading.file import File, open
 from mcz.files.writing.atomic import Digest
 from mcz.model.schema import parse, parse_until, read_varint
@@ -52,9 +52,9 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
     aliases = container.directory.aliases
     by_target = {target: digest for digest, target in contents.items()} if aliases else {}
     file = File(container)
-    for name, alias in aliases.items():
-        target_digest = by_target.get((alias[0], bytes(alias[1])))
-        paths.setdefault(name, target_digest or partial(_digest_of, _restorer_of(file, *alias)))
+    for name, (of, target) in aliases.items():
+        one = StoredFile(name, ALIAS, name)
+        paths.setdefault(name, by_target.get((of, bytes(target))) or partial(_digest_of, file, one))
     return paths, contents
 
 
@@ -105,15 +105,8 @@ def _parse_digest(cend: bytes) -> bytes:
     return cend[at + 2 : at + 34] if cend[at + 1] else b""
 
 
-def _restorer_of(file: File, of: int, target: bytes) -> Callable[[], bytes]:
-    if of == payloads.OF_SKELETON:
-        return partial(file.skeleton_bytes, target)
-    name = target.decode("utf-8", "replace")
-    return file.clips[name].source_bytes if of == payloads.OF_CLIP else file.attachments[name].read
-
-
-def _digest_of(restore: Callable[[], bytes]) -> bytes:
-    return hashlib.sha256(restore()).digest()
+def _digest_of(file: File, one: StoredFile) -> bytes:
+    return hashlib.sha256(_restore((file, None), one)).digest()
 
 
 NAMES = ("stored", "portable", "strict")  # treatment of names that are not portable
@@ -192,7 +185,7 @@ def _fileless_outcomes(clips: Iterable[Clip]) -> Iterator[Outcome]:
 
 @dataclass(frozen=True, slots=True)
 class StoredFile:
-    """A file of the archive under ``path``, from the thing ``name`` of that ``kind``."""
+    """A file of the archive under ``path``, from the item ``name`` of that ``kind``."""
 
     path: str
     kind: str
@@ -223,7 +216,7 @@ def named_files(file: File) -> Iterator[tuple[str, Callable[[], bytes]]]:
         yield one.path, partial(_restore, (file, None), one)
 
 
-def _resolve(file: File, one: StoredFile) -> Thing:
+def _resolve(file: File, one: StoredFile) -> Item:
     return file.alias_of(one.name) if one.kind == ALIAS else (one.kind, one.name)
 
 

@@ -1,17 +1,17 @@
-"""A live clip in its reader: its head, its decoder, its frames in order and their hash.
+"""A live clip in its reader: its head, its decoder, its frames and their hash; strict reading.
 
-SPEC.md, "Open DATA and packets", is normative, and "Live streams with losses" has the limits; the
-substitute of a lost frame is a reader's choice.
+``reader_with_losses.py`` continues after lost frames. SPEC.md, "Open DATA and packets", is
+normative.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Literal
+from typing import BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,14 @@ from mcz.codecs import codec_by_id
 from mcz.codecs.contract import LiveDecoder
 from mcz.codecs.known_answers import check_known_answer
 from mcz.container import payloads
-from mcz.container.chunks import FRAME, SIGNATURE, Chunk, ChunkType, build_foot
-from mcz.container.directory import ClipRow
+from mcz.container.chunks import FRAME, SHARED, SIGNATURE, Chunk, ChunkType, build_foot
+from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.encodings import chunk_id
+from mcz.container.grammar import ChunkEvent, PacketEvent
 from mcz.container.model_records import ValueDigest
+from mcz.container.parser_drivers import Stream
 from mcz.container.reader import Container
+from mcz.container.scanner import Scanner
 from mcz.container.segments import (
     FRESH,
     MASKS,
@@ -33,9 +37,11 @@ from mcz.container.segments import (
     parse_stream_table,
 )
 from mcz.container.source import ByteSource
-from mcz.errors import ChecksumError, FormatError, LostFrameError, TruncatedError, UnsupportedError
+from mcz.errors import ChecksumError, FormatError, TruncatedError, UnsupportedError
+from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import SignalInfo, check_roles, read_signal
 from mcz.model.motion import Skeleton
+from mcz.model.schema import parse
 from mcz.model.text_format import fields_text
 from mcz.model.types import Floats, Values
 
@@ -60,92 +66,6 @@ class LiveFrame:
     state: State = "decoded"
 
     __repr__ = fields_text
-
-
-class Concealer:
-    """Puts frames in order; ``lost`` decides the substitute of missing ones.
-
-    ``shown`` are the stored frames that the clip shows, None for all; input counts stored frames,
-    output the shown ones. ``due`` is the stored frame that comes next, None as long as it is
-    unknown. ``spend`` decides whether so many may be concealed.
-    """
-
-    def __init__(
-        self,
-        n_channels: int,
-        lost: Lost,
-        shown: range | None,
-        spend: Callable[[int], bool],
-        *,
-        join: bool = False,
-    ) -> None:
-        self._first = 0 if shown is None else shown.start
-        self._stop = None if shown is None else shown.stop
-        self.due: int | None = None if join else self._first
-        self._lost, self._spend = lost, spend
-        self._nothing = np.full(n_channels, np.nan), np.zeros(n_channels, np.bool_)
-        self._last: tuple[Floats, Mask] | None = None
-        self._owed = 0  # frames before the one due that wait for the next decoded one
-        self.is_whole = not join  # every shown frame up to now was decoded
-
-    def give(self, number: int, values: Floats, mask: Mask | None) -> Iterator[LiveFrame]:
-        """Add a decoded frame; earlier ones that are due were not decoded."""
-        yield from self.reach(number)
-        assert self.due is not None
-        if number < self.due or (self._stop is not None and number >= self._stop):
-            return
-        valid = np.ones(values.shape, np.bool_) if mask is None else mask
-        shown = values if mask is None else np.where(valid, values, np.nan)
-        if self._owed:
-            yield from self._between(shown, valid)
-        self.due, self._last = number + 1, (shown, valid)
-        yield LiveFrame(number - self._first, shown, valid)  # LIVE-02
-
-    def reach(self, number: int) -> Iterator[LiveFrame]:
-        """Note that no frame before ``number`` will come."""
-        if self.due is None:
-            self.due = max(self._first, number)
-            self.is_whole = self.due == self._first
-        if self._stop is not None:
-            number = min(number, self._stop)
-        count = number - self.due
-        if count <= 0:
-            return
-        self.is_whole = False
-        if self._lost == "refuse":
-            raise LostFrameError(f"frame {self.due - self._first} did not arrive")
-        if not self._spend(count):  # LIVE-12
-            yield from self.end()
-            self.due = number
-        elif self._lost == "linear" and self._last is not None:
-            self.due += count
-            self._owed += count
-        else:
-            for _ in range(count):
-                self.due += 1
-                yield self._held(self.due - 1)
-
-    def end(self) -> Iterator[LiveFrame]:
-        """Note that no frame follows the missing ones."""
-        owed, self._owed = self._owed, 0
-        for number in range((self.due or 0) - owed, self.due or 0):
-            yield self._held(number)
-
-    def _held(self, number: int) -> LiveFrame:
-        if self._last is None or self._lost == "missing":
-            return LiveFrame(number - self._first, *self._nothing, "missing")
-        return LiveFrame(number - self._first, *self._last, "concealed")  # LIVE-01
-
-    def _between(self, values: Floats, valid: Mask) -> Iterator[LiveFrame]:
-        """The frames that are owed, on straight lines from the last decoded one to ``values``."""
-        assert self._last is not None
-        assert self.due is not None
-        before, known = self._last
-        both, steps = known & valid, self._owed + 1
-        for k in range(1, steps):
-            row = np.where(both, before + (values - before) * (k / steps), np.nan)
-            yield LiveFrame(self.due - steps + k - self._first, row, both, "concealed")
-        self._owed = 0
 
 
 Shared = dict[tuple[bytes, bytes], bytes]  # kind and id -> chunk
@@ -275,3 +195,133 @@ class ClipState:
             )
         if self._digest.digest() != hashes[0]:
             raise ChecksumError("its frames differ from the hash in CEND", where=self._where)
+
+
+MOST_REMARKS = 20
+
+
+@dataclass(slots=True)
+class StreamSummary:
+    """Result of a stream, in frames and bytes.
+
+    ``skipped`` frames did not come and were too many to conceal. ``payload_bytes`` are those of the
+    codec's streams, the others of ``stream_bytes`` frame them. ``is_cut``: the stream ended before
+    its file did. ``is_checked``: the value hash of each clip was right; it cannot be compared where
+    frames are missing. ``remarks`` describe the first of ``n_faults`` faults.
+    """
+
+    decoded: int = 0
+    concealed: int = 0
+    missing: int = 0
+    skipped: int = 0
+    payload_bytes: int = 0
+    stream_bytes: int = 0
+    is_cut: bool = False
+    is_checked: bool = False
+    n_faults: int = 0
+    remarks: list[str] = field(default_factory=list)
+
+    __repr__ = fields_text
+
+    def count(self, frame: LiveFrame) -> None:
+        setattr(self, frame.state, getattr(self, frame.state) + 1)
+
+    def fault(self, text: str) -> None:
+        self.n_faults += 1
+        if len(self.remarks) < MOST_REMARKS:
+            self.remarks.append(text)
+
+
+class StrictFrames:
+    """The frames of a stream; ``clip`` is the clip of the last one."""
+
+    def __init__(self, stream: BinaryIO, summary: StreamSummary) -> None:
+        self._stream, self.summary = Stream(stream), summary
+        self.scanner = Scanner(None)
+        self.clip: LiveClip | None = None
+        self.is_checked = False  # a value hash was right
+
+    @property
+    def size(self) -> int:
+        return self._stream.size
+
+    def frames(self) -> Iterator[LiveFrame]:
+        """As ``live_frames``."""
+        head = b""
+        shared: Shared = {}
+        clip: ClipState | _WholeClip | None = None
+        for event in self._stream.events(self.scanner.parser):
+            self.scanner.take(event)
+            if not isinstance(event, (ChunkEvent, PacketEvent)):
+                continue
+            kind = event.chunk.type
+            if kind == ChunkType.HEAD:
+                head = event.data
+            elif kind in SHARED:
+                shared.setdefault((kind, chunk_id(kind, event.payload)), event.data)
+            elif kind == ChunkType.CLIP:
+                row = self.scanner.clip
+                assert row is not None
+                fields = parse(payloads.Clip, event.payload, row.clip.label)
+                before = opening(head, shared, fields)
+                clip = begin_clip(head, shared, row, fields) or _WholeClip(
+                    before + event.data, row.name
+                )
+            elif isinstance(clip, ClipState):
+                if kind == ChunkType.CEND:
+                    clip.check_hash(parse(payloads.Cend, event.payload, "CEND"))  # PACK-19
+                    self.is_checked = True
+                for segment in self.scanner.clip.segments if self.scanner.clip else ():
+                    yield from self._frame(clip, segment, event.payload)
+            elif clip is not None:
+                yield from clip.take(self, kind, event)
+            self.scanner.forget()
+            clip = None if kind == ChunkType.CEND else clip
+        self.summary.is_checked = self.is_checked
+
+    def _frame(self, clip: ClipState, row: SegmentRow, payload: bytes) -> Iterator[LiveFrame]:
+        if row.header.signal:
+            return
+        stream, mask = clip.parts(row.header, row.packet, payload)
+        self.summary.payload_bytes += len(stream)
+        frame = row.header.first
+        fresh = bool(row.header.flags & FRESH)
+        if not (frame or fresh):
+            raise FormatError("the first segment depends on an earlier one", clip=clip.clip.name)
+        values = clip.decoder.push(stream, fresh)
+        if clip.shown is not None:
+            if frame not in clip.shown:
+                return
+            frame -= clip.shown.start
+        clip.digest(values, mask)
+        self.clip = clip.clip
+        if mask is None:
+            yield LiveFrame(frame, values, np.ones(values.shape, np.bool_))
+        else:
+            yield LiveFrame(frame, np.where(mask, values, np.nan), mask)
+
+
+class _WholeClip:
+    def __init__(self, data: bytes, name: str) -> None:
+        self._parts, self._name = [data], name
+
+    def take(
+        self, reader: StrictFrames, kind: bytes, event: ChunkEvent | PacketEvent
+    ) -> Iterator[LiveFrame]:
+        self._parts.append(event.data)
+        if kind != ChunkType.CEND:
+            return
+        data = b"".join(self._parts) + build_foot(0, 0)
+        container = Container(ByteSource(io.BytesIO(data)), verify=True)
+        clip = Clip(container, container.directory.clips[self._name])
+        values, mask = clip.read_masked()
+        reader.clip = LiveClip(clip.name, clip.skeleton, clip.frame_rate, clip.codec)
+        reader.summary.payload_bytes += sum(row.size for row in clip.signals[0].rows)
+        reader.is_checked = True
+        per_frame = clip.signals[0].layout.samples_per_frame
+        valid = np.ones(values.shape, np.bool_) if mask is None else mask
+        if not valid.all():
+            values = np.where(valid, values, np.nan)
+        for frame in range(clip.n_frames):
+            rows = frame if per_frame == 1 else slice(frame * per_frame, (frame + 1) * per_frame)
+            yield LiveFrame(frame, values[rows], valid[rows])

@@ -1,7 +1,6 @@
-"""Live streams as Python generators: rows of numbers -> bytes to send, and back.
+"""Live streams as Python generators: rows of numbers, or lines of text, -> bytes to send, and back.
 
-Frames are read strictly here; ``reader_with_losses.py`` continues after lost ones. SPEC.md, "Open
-DATA and packets", is normative.
+SPEC.md, "Open DATA and packets", is normative.
 """
 
 from __future__ import annotations
@@ -17,40 +16,26 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcz.container import payloads
-from mcz.container.chunks import ChunkType, build_foot
-from mcz.container.directory import SegmentRow
-from mcz.container.encodings import chunk_id
-from mcz.container.grammar import ChunkEvent, PacketEvent
-from mcz.container.parser_drivers import Stream
-from mcz.container.reader import Container
-from mcz.container.scanner import Scanner
-from mcz.container.segments import FRESH
-from mcz.container.source import ByteSource
-from mcz.errors import FormatError, MotionError, OptionError, TruncatedError
-from mcz.files.live.clip_state import (
-    LOST,
-    ClipState,
-    LiveClip,
-    LiveFrame,
-    Lost,
-    Shared,
-    begin_clip,
-    opening,
-)
-from mcz.files.live.reader_with_losses import FramesWithLosses, StreamSummary
+from mcz.codecs import codec_by_name
+from mcz.container.writer import Sink
+from mcz.errors import FormatError, MotionError, OptionError, SourceError, TruncatedError
+from mcz.files.live.clip_state import LOST, LiveClip, LiveFrame, Lost, StreamSummary, StrictFrames
+from mcz.files.live.reader_with_losses import FramesWithLosses
 from mcz.files.live.writer import LiveWriter
-from mcz.files.reading.clip import Clip
+from mcz.files.reading.read import NONE
+from mcz.files.reading.read import NOTE as SKELETON_NOTE
+from mcz.files.reading.source_files import SourceOptions, read_skeleton
+from mcz.files.writing.file import EncodingOptions, rate_notes
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Skeleton
-from mcz.model.schema import parse
 from mcz.model.types import Params, Values
 from mcz.model.units import in_unit, with_axes
+from mcz.sources import FORMATS, likely_formats
+from mcz.sources.text.source import Arriving
 
 if TYPE_CHECKING:
     from mcz.codecs.transforms.post_filter import PostFilter
 
 Frame = tuple[int, Values, NDArray[np.bool_]]
-SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)  # chunks that clips refer to
 
 
 def live_frames(stream: BinaryIO) -> Iterator[Frame]:
@@ -66,101 +51,6 @@ def live_frames(stream: BinaryIO) -> Iterator[Frame]:
         raise OptionError(f"cannot read from {stream!r}, which is not a binary stream")
     frames = StrictFrames(stream, StreamSummary()).frames()
     return ((frame.number, frame.values, frame.valid) for frame in frames)
-
-
-class StrictFrames:
-    """The frames of a stream; ``clip`` is the clip of the last one."""
-
-    def __init__(self, stream: BinaryIO, summary: StreamSummary) -> None:
-        self._stream, self.summary = Stream(stream), summary
-        self.scanner = Scanner(None)
-        self.clip: LiveClip | None = None
-        self.is_checked = False  # a value hash was right
-
-    @property
-    def size(self) -> int:
-        return self._stream.size
-
-    def frames(self) -> Iterator[LiveFrame]:
-        """As ``live_frames``."""
-        head = b""
-        shared: Shared = {}
-        clip: ClipState | _WholeClip | None = None
-        for event in self._stream.events(self.scanner.parser):
-            self.scanner.take(event)
-            if not isinstance(event, (ChunkEvent, PacketEvent)):
-                continue
-            kind = event.chunk.type
-            if kind == ChunkType.HEAD:
-                head = event.data
-            elif kind in SHARED:
-                shared.setdefault((kind, chunk_id(kind, event.payload)), event.data)
-            elif kind == ChunkType.CLIP:
-                row = self.scanner.clip
-                assert row is not None
-                fields = parse(payloads.Clip, event.payload, row.clip.label)
-                before = opening(head, shared, fields)
-                clip = begin_clip(head, shared, row, fields) or _WholeClip(
-                    before + event.data, row.name
-                )
-            elif isinstance(clip, ClipState):
-                if kind == ChunkType.CEND:
-                    clip.check_hash(parse(payloads.Cend, event.payload, "CEND"))  # PACK-19
-                    self.is_checked = True
-                for segment in self.scanner.clip.segments if self.scanner.clip else ():
-                    yield from self._frame(clip, segment, event.payload)
-            elif clip is not None:
-                yield from clip.take(self, kind, event)
-            self.scanner.forget()
-            clip = None if kind == ChunkType.CEND else clip
-        self.summary.is_checked = self.is_checked
-
-    def _frame(self, clip: ClipState, row: SegmentRow, payload: bytes) -> Iterator[LiveFrame]:
-        if row.header.signal:
-            return
-        stream, mask = clip.parts(row.header, row.packet, payload)
-        self.summary.payload_bytes += len(stream)
-        frame = row.header.first
-        fresh = bool(row.header.flags & FRESH)
-        if not (frame or fresh):
-            raise FormatError("the first segment depends on an earlier one", clip=clip.clip.name)
-        values = clip.decoder.push(stream, fresh)
-        if clip.shown is not None:
-            if frame not in clip.shown:
-                return
-            frame -= clip.shown.start
-        clip.digest(values, mask)
-        self.clip = clip.clip
-        if mask is None:
-            yield LiveFrame(frame, values, np.ones(values.shape, np.bool_))
-        else:
-            yield LiveFrame(frame, np.where(mask, values, np.nan), mask)
-
-
-class _WholeClip:
-    def __init__(self, data: bytes, name: str) -> None:
-        self._parts, self._name = [data], name
-
-    def take(
-        self, reader: StrictFrames, kind: bytes, event: ChunkEvent | PacketEvent
-    ) -> Iterator[LiveFrame]:
-        self._parts.append(event.data)
-        if kind != ChunkType.CEND:
-            return
-        data = b"".join(self._parts) + build_foot(0, 0)
-        container = Container(ByteSource(io.BytesIO(data)), verify=True)
-        clip = Clip(container, container.directory.clips[self._name])
-        values, mask = clip.read_masked()
-        reader.clip = LiveClip(clip.name, clip.skeleton, clip.frame_rate, clip.codec)
-        reader.summary.payload_bytes += sum(row.size for row in clip.signals[0].rows)
-        reader.is_checked = True
-        per_frame = clip.signals[0].layout.samples_per_frame
-        valid = np.ones(values.shape, np.bool_) if mask is None else mask
-        if not valid.all():
-            values = np.where(valid, values, np.nan)
-        for frame in range(clip.n_frames):
-            rows = frame if per_frame == 1 else slice(frame * per_frame, (frame + 1) * per_frame)
-            yield LiveFrame(frame, values[rows], valid[rows])
 
 
 AXES = "xyz"
@@ -375,3 +265,125 @@ class _PieceStream:
             if piece:
                 return bytes(piece)
         return b""
+
+
+NOTE = "coded live, frame by frame, from {format} text, which was not kept"
+
+
+class LiveText:
+    """A motion that arrives as text, and ``writer``, which writes it.
+
+    ``remarks`` list facts that the clip cannot hold, complete when ``push_all`` has returned.
+    """
+
+    def __init__(self, arriving: Arriving, writer: LiveWriter, remarks: tuple[str, ...]) -> None:
+        self.writer, self.remarks = writer, remarks
+        self._open_source = arriving
+
+    def push_all(self) -> None:
+        """Write each frame before the next line is read.
+
+        Raises SourceError for malformed text, for a last line without a line end, and for fewer
+        frames than declared; the clip has all frames before that.
+        """
+        due, is_renumbered = self._open_source.first_number, False
+        for number, values in self._open_source.frames:
+            if number is not None and number != due:
+                if number > due:
+                    self.writer.miss(number - due)
+                elif not is_renumbered:
+                    remark = f"frame {number} comes where {due} is due; the clip counts on"
+                    self.remarks = (*self.remarks, remark)
+                    is_renumbered = True
+                due = number
+            self.writer.push(values)
+            due += 1
+        declared, n_frames = self._open_source.declared, self.writer.n_frames
+        if declared not in (None, n_frames):
+            remark = f"{declared} frames are declared, {n_frames} came"
+            if n_frames < declared:
+                raise SourceError(remark)
+            self.remarks = (*self.remarks, remark)
+
+
+def begin_live(
+    lines: Iterable[bytes],
+    sink: Sink,
+    source_format: str,
+    options: SourceOptions,
+    encoding: EncodingOptions,
+) -> LiveText:
+    """A live clip, up to its first frame, of the motion in ``lines``.
+
+    The caller uses its writer as a context manager. ``source_format`` is ``bvh`` or ``amc``; an AMC
+    needs the ``skeleton`` of ``options``, its ASF. Raises SourceError for malformed text, and
+    otherwise as ``LiveWriter``.
+    """
+    arriving, base = _open_source(_check_lines(lines), source_format, options)
+    notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
+    metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
+    writer = LiveWriter(
+        sink,
+        with_axes(in_unit(arriving.skeleton, options.unit), *options.axes),
+        encoding.codec,
+        encoding.params,
+        frame_rate=arriving.frame_rate if options.rate is None else Fraction(options.rate),
+        frame_rate_exact=arriving.frame_rate_exact if options.rate is None else True,
+        metadata=metadata,
+        first_number=arriving.first_number,
+        base=base,
+    )
+    return LiveText(arriving, writer, _remarks_on(arriving, options))
+
+
+def _check_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
+    """Lines as they come; raises SourceError for a last one that may be truncated."""
+    for number, line in enumerate(lines, 1):
+        if not line.endswith(b"\n") and line.strip():
+            raise SourceError(f"line {number} has no line end: the source was cut off")
+        yield line
+
+
+def _open_source(
+    lines: Iterable[bytes], source_format: str, options: SourceOptions
+) -> tuple[Arriving, Skeleton | None]:
+    text_format = FORMATS.get(source_format)
+    if text_format is None or text_format.arrive is None:
+        able = ", ".join(f.name for f in FORMATS.values() if f.arrive is not None)
+        raise OptionError(
+            f"format {source_format!r} cannot be read line by line; these can: {able}"
+        )
+    base = None
+    if text_format.wants_skeleton:
+        if options.skeleton is None or options.skeleton == NONE:
+            raise OptionError(f"{source_format} read line by line needs its skeleton file")
+        base = in_unit(read_skeleton(options.skeleton), options.unit)
+    arriving: Arriving = text_format.arrive(iter(lines), base)
+    return arriving, base
+
+
+def _remarks_on(arriving: Arriving, options: SourceOptions) -> tuple[str, ...]:
+    notes = tuple(rate_notes(arriving.frame_rate, options))
+    if SKELETON_NOTE not in arriving.metadata:
+        return notes
+    return (f"{options.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}", *notes)
+
+
+def codes_live(codec: str, params: Params) -> bool:
+    """Return True if the codec of that name, with these parameters, codes frame by frame.
+
+    Raises OptionError for an unknown codec or parameter.
+    """
+    chosen = codec_by_name(codec)
+    if chosen.live is None:
+        return False
+    options = chosen.options(params)
+    return all(options[name] == value for name, value in chosen.live_options.items())
+
+
+def suffix_of(data: bytes, format_name: str | None) -> str:
+    """The suffix of files of a source format, or the likely one of ``data``; OptionError."""
+    formats = likely_formats(data) if format_name is None else (format_name,)
+    if not formats:
+        raise OptionError("the format is unknown; name it")
+    return FORMATS[formats[0]].suffix

@@ -25,7 +25,7 @@ from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
 from mcz.files.reading.stored_clip import with_indices
 from mcz.files.writing.atomic import check_metadata
-from mcz.files.writing.clip_writer import begin_open_clip
+from mcz.files.writing.clip_writer import begin_open_clip, quality_payload, texts_of
 from mcz.files.writing.planning import (
     Prepared,
     StoredSkeleton,
@@ -35,9 +35,9 @@ from mcz.files.writing.planning import (
     under_its_path,
     wants_positions,
 )
-from mcz.files.writing.quality import CHUNK, RunningFigures, quality_payload, texts_of
 from mcz.files.writing.signal_source import MemorySource
 from mcz.kinematics.frames import FramePositions
+from mcz.kinematics.metrics.sums import RunningFigures
 from mcz.kinematics.points import NOTE, SEPARATOR, marker_skeleton
 from mcz.model.motion import Motion, Signal, Skeleton
 from mcz.model.text_format import fields_text
@@ -253,8 +253,8 @@ class LiveWriter:
             self._writer.close_data()
             self._has_data = False
         mask = b"" if valid is None else build_mask(valid[None])
-        told_again = self._was_masked and self._encoder.is_reference
-        if self._has_data and mask == self._mask and not told_again:
+        repeats_mask = self._was_masked and self._encoder.is_reference
+        if self._has_data and mask == self._mask and not repeats_mask:
             self._writer.frame(self.n_frames, stream, fresh=fresh)
             return
         if not self._has_data:
@@ -327,7 +327,7 @@ class LiveWriter:
             settings = {f"param.{name}": value for name, value in fixed.items()}
             record = {"codec": self.codec.name, **settings, **self._figures.entries()}
             stored = with_indices(texts_of(record), self._figures.skeleton)
-            self._writer.ancillary(CHUNK, quality_payload(stored))
+            self._writer.ancillary(ChunkType.QUAL, quality_payload(stored))
         self._writer.finish()
         self._outlet.send()
 

@@ -17,7 +17,7 @@ from mcz.container.reader import Container
 from mcz.errors import ChecksumError, FormatError, OptionError
 from mcz.files.reading.signal_info import SignalInfo, groups_of
 from mcz.files.reading.signal_reader import SignalReader
-from mcz.files.reading.source_info import SourceInfo, read_source, sourced_skeleton, stating_rate
+from mcz.files.reading.source_files import SourceInfo, sourced_skeleton, stating_rate, stored_source
 from mcz.files.reading.stored_clip import StoredClip
 from mcz.files.reading.views import (
     ClipValues,
@@ -165,8 +165,7 @@ class Clip(StoredClip):
         last = info.counts.n_resolutions - 1
         if not 0 <= resolution <= last:
             raise OptionError(
-                f"no resolution {resolution}: it has resolutions 0 to {last}",
-                clip=self.name,
+                f"no resolution {resolution}: it has resolutions 0 to {last}", clip=self.name
             )
 
     def groups_of(self, info: SignalInfo, joints: Joints) -> tuple[tuple[int, ...], list[int]]:
@@ -266,7 +265,7 @@ class Clip(StoredClip):
         try:
             if self._row.skeleton != self._fields.skeleton:  # salvage has replaced it
                 raise FormatError("the joint names of its skeleton are lost")
-            source = read_source(self.container, fields, info, self.signals[0], frames)
+            source = stored_source(self.container, fields, info, self.signals[0], frames)
         except FormatError as error:
             self._complain(f"its source file is lost: {error}", error)
             return None
@@ -308,8 +307,8 @@ class Clip(StoredClip):
         frames if the codec stores some apart (qbc: its marks); otherwise they are its coarsest
         resolution. Raises OptionError for a codec without either.
         """
-        preview = self.previewed(joints)
-        return FrameValues(preview.frames, preview.masked())
+        shown = self.previewed(joints)
+        return FrameValues(shown.frames, shown.masked())
 
     def previewed(self, joints: Joints = None) -> Preview:
         """``preview`` with a separate mask, and the distance of its frames."""

@@ -119,16 +119,6 @@ def _last_record(key: str, clip: Clip) -> Record | None:
     return next((r for r in records if key in r.entries or key in r.removed), None)
 
 
-def _frame_rate(clip: Clip) -> Value:
-    rate = clip.frame_rate
-    return None if rate is None else float(rate)
-
-
-def _duration(clip: Clip) -> Value:
-    rate = clip.frame_rate
-    return None if rate is None else float(clip.n_frames / rate)
-
-
 def _lossless(clip: Clip) -> Value:
     try:
         return all(
@@ -185,8 +175,8 @@ def _format(clip: Clip) -> Value:
 FIELDS: dict[str, Getter] = {
     "name": lambda clip: clip.name,
     "n_frames": lambda clip: clip.n_frames,
-    "frame_rate": _frame_rate,
-    "duration": _duration,
+    "frame_rate": lambda clip: float(rate) if (rate := clip.frame_rate) else None,
+    "duration": lambda clip: float(clip.n_frames / rate) if (rate := clip.frame_rate) else None,
     "n_channels": lambda clip: clip.n_channels,
     "codec": lambda clip: clip.codec,
     "lossless": _lossless,

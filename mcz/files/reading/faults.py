@@ -1,16 +1,29 @@
-"""The faults of a file: of its checksums and index alone, or of all of it, decoded."""
+"""The faults of a file: of its checksums and index alone, or of all of it, decoded.
+
+The checksums are checked in one pass at the speed of the disk, which holds a block at a time and
+continues after a fault to report all of them. SPEC.md, "Chunks", "Open DATA and packets", "INDX"
+and "FOOT", are normative.
+"""
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
-from dataclasses import dataclass
+from contextlib import ExitStack, closing, suppress
+from dataclasses import dataclass, field
 from functools import partial
 
-from mcz.container.checksums import ChecksumReport, check_checksums
-from mcz.container.chunks import Chunk, ChunkType
-from mcz.container.reader import Container
-from mcz.container.recovery import encode_packets, read_packet
+from mcz.container.chunks import END, SHARED, Chunk, ChunkType
+from mcz.container.directory import ClipRow, Directory
+from mcz.container.encodings import chunk_id
+from mcz.container.grammar import INDEX, START, ChunkEvent, Event, Fault, PacketEvent
+from mcz.container.index_reader import directory_of, read_indexes
+from mcz.container.limits import index_limit
+from mcz.container.model_records import parse_head
+from mcz.container.parser import WHOLE, Parser
+from mcz.container.parser_drivers import events
+from mcz.container.recovery import check_protection, recovery_chunks
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.errors import (
@@ -30,9 +43,191 @@ from mcz.files.reading.signal_info import read_segments
 from mcz.model.text_format import fields_text
 from mcz.model.types import Target
 
-HEADINGS = tuple(
-    "HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL META REPT COPY RECV INDX".split()
-)
+KEPT = (ChunkType.HEAD, *SHARED)  # chunks whose payloads the pass needs
+_PLACE = struct.Struct("<QQB")  # of a segment: offset, size, kind of its packet
+Report = Callable[[int, int], object]
+
+
+@dataclass(slots=True)
+class ChecksumReport:
+    """Findings of one pass; ``faults``: the place and kind of each, in file order.
+
+    ``indexed``: the file ends with an INDX, which was compared with the chunks.
+    """
+
+    n_chunks: int = 0
+    n_packets: int = 0
+    indexed: bool = False
+    faults: list[tuple[int, str]] = field(default_factory=list)
+
+
+def check_checksums(source: ByteSource, progress: Report | None = None) -> ChecksumReport:
+    """Check each checksum of ``source``, and compare INDX and FOOT with the chunks.
+
+    Nothing is decoded: only a full check finds faults within sound checksums. ``progress`` is
+    called with the number of bytes done and the size of the file. Raises UnsupportedError where the
+    file needs a newer reader, AccessError where it cannot be read.
+    """
+    check = _Check(source)
+    for event in events(source, check.parser):
+        check.take(event)
+        if progress is not None and not isinstance(event, PacketEvent):
+            progress(min(check.parser.at, source.size), source.size)
+    check.finish()
+    return check.seen
+
+
+class _Check:
+    def __init__(self, source: ByteSource) -> None:
+        self._source = source
+        self.parser = Parser(source.size, want=lambda chunk: WHOLE * (chunk.type in KEPT))
+        self.seen = ChecksumReport()
+        self._places = _Places()
+        self._index: Chunk | None = None  # that the last FOOT closes
+        self._end = 0  # of the last FOOT
+        self._has_lost = False  # an unknown part of the file was passed
+
+    def take(self, event: Event) -> None:
+        """Process an event; raises UnsupportedError."""
+        if isinstance(event, PacketEvent):
+            packet = event.packet
+            if packet.kind != END:
+                self.seen.n_packets += 1
+                if self._places.clips:
+                    self._places.clips[-1].segment(event.body, len(packet.body), packet.kind)
+        elif isinstance(event, Fault):
+            self._take_fault(event)
+        elif isinstance(event, ChunkEvent):
+            self._take_chunk(event)
+        else:
+            self._index, self._end = event.index, event.end
+
+    def _note(self, at: int, text: str) -> None:
+        self.seen.faults.append((at, text))
+
+    def _take_fault(self, fault: Fault) -> None:
+        """Note a fault of a checksum, or of the grammar if everything before is known."""
+        event, chunk = fault.event, fault.chunk
+        if isinstance(fault.error, UnsupportedError):
+            raise fault.error
+        if fault.offset and fault.offset >= self._source.size:  # the end, see ``finish``
+            return
+        is_known = fault.state in (START, INDEX) or not (
+            self._has_lost or isinstance(event, PacketEvent)
+        )
+        if event is None or is_known or isinstance(fault.error, ChecksumError):
+            self._note(fault.offset, str(fault.error))
+        if event is not None:
+            self.take(event)
+        elif fault.is_lost:
+            self._has_lost = True
+        elif chunk is not None:
+            self._has_lost = self._has_lost or chunk.type in (*KEPT, ChunkType.INDX)
+            self.seen.n_chunks += 1
+            self._places.add(chunk)
+
+    def _take_chunk(self, event: ChunkEvent) -> None:
+        chunk = event.chunk
+        self.seen.n_chunks += 1
+        if chunk.type == ChunkType.HEAD:
+            self._places.head = event.payload
+            try:
+                self.parser.profile = parse_head(event.payload)
+            except UnsupportedError:
+                raise
+            except FormatError as error:
+                self._note(chunk.offset, str(error))
+        elif chunk.type in SHARED:
+            with suppress(FormatError):  # its content is not checked here
+                id_ = chunk_id(chunk.type, event.payload, self.parser.profile)
+                self._places.shared.setdefault((chunk.type, id_), chunk)
+        self._places.add(chunk)
+
+    def finish(self) -> None:
+        """Compare the last index with the file, if all of the file is known."""
+        size, index = self._source.size, self._index
+        if self._end != size:
+            self._note(size, f"the file ends at {size} without a FOOT")
+        elif index is not None and not self._has_lost:
+            try:
+                limit = index_limit(size)
+                listed = read_indexes(self._source.read, index.offset, index.size, limit)
+                faults = self._places.differences(directory_of(listed))
+            except FormatError as error:
+                faults = [str(error)]
+            for text in faults:
+                self._note(index.offset, f"chunk {index.label}: {text}")
+            self.seen.indexed = True
+
+
+@dataclass(slots=True)
+class _ClipPlaces:
+    """The chunks of a clip; of its segments, which may be many, a count and a CRC-32 of places."""
+
+    clip: Chunk
+    n_segments: int = 0
+    segments: int = 0
+    cend: Chunk | None = None
+    ancillary: list[Chunk] = field(default_factory=list)
+
+    def segment(self, offset: int, size: int, packet: int = 0) -> None:
+        """Add a segment; ``packet`` is the kind of its packet, as in ``SegmentRow``."""
+        self.n_segments += 1
+        self.segments = zlib.crc32(_PLACE.pack(offset, size, packet), self.segments)
+
+
+@dataclass(slots=True)
+class _Places:
+    head: bytes = b""
+    shared: dict[tuple[bytes, bytes], Chunk] = field(default_factory=dict)
+    attachments: list[Chunk] = field(default_factory=list)
+    n_aliases: int = 0
+    clips: list[_ClipPlaces] = field(default_factory=list)
+
+    def add(self, chunk: Chunk) -> None:
+        """Add the next chunk of any type; chunks of ``shared`` are added separately."""
+        clip = self.clips[-1] if self.clips else None
+        if chunk.type == ChunkType.CLIP:
+            self.clips.append(_ClipPlaces(chunk))
+        elif chunk.type == ChunkType.ATTA:
+            self.attachments.append(chunk)
+        elif chunk.type == ChunkType.ALIA:
+            self.n_aliases += 1
+        elif clip is None:
+            return
+        elif chunk.type == ChunkType.CEND:
+            clip.cend = chunk
+        elif chunk.type == ChunkType.DATA and chunk.length is not None:
+            clip.segment(chunk.payload_offset, chunk.length)
+        elif chunk.flags and chunk.type != ChunkType.INDX and clip.cend is not None:
+            clip.ancillary.append(chunk)
+
+    def differences(self, listed: Directory) -> list[str]:
+        """The faults of an index, in words; empty if it is right."""
+        faults = []
+        if listed.head != self.head:
+            faults.append("its copy of HEAD differs from HEAD")
+        if list(listed.shared.items()) != list(self.shared.items()):
+            faults.append("it lists other skeletons, models or sources than the file has")
+        if [part for row in listed.attachments.values() for part in row.parts] != self.attachments:
+            faults.append("it lists other attachments than the file has")
+        if self.n_aliases != len(listed.aliases):
+            faults.append(
+                f"it lists {len(listed.aliases)} aliases, but the file has {self.n_aliases}"
+            )
+        if len(self.clips) != len(listed.clips):
+            return [*faults, f"it lists {len(listed.clips)} clips, there are {len(self.clips)}"]
+        pairs = zip(self.clips, listed.clips.values(), strict=True)
+        moved = (row.name for places, row in pairs if places != places_of(row))
+        return faults + [f"clip {name!r} does not lie where it says" for name in moved]
+
+
+def places_of(row: ClipRow) -> _ClipPlaces:
+    """Places of a clip as listed by an index; raises FormatError for a wrong index."""
+    places = _ClipPlaces(row.clip, cend=row.cend, ancillary=row.ancillary)
+    for segment in row.segments:
+        places.segment(segment.offset, segment.size, segment.packet)
+    return places
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +247,12 @@ class Problem:
 
 def heading(source: ByteSource, offset: int) -> str:
     """The heading of SPEC.md for the chunk at ``offset``."""
-    kind = source.read(offset, min(4, source.size - offset)).decode("latin-1")
-    return kind if kind in HEADINGS else "Chunks"
+    kind = source.read(offset, min(4, source.size - offset))
+    return kind.decode() if kind in set(ChunkType) else "Chunks"
 
 
 def quick_check(
-    target: Target, progress: Callable[[int, int], object] | None = None
+    target: Target, progress: Report | None = None
 ) -> tuple[ChecksumReport, list[Problem]]:
     """Check every checksum of a file and its index; returns the report and the faults.
 
@@ -65,18 +260,13 @@ def quick_check(
     is called with the number of bytes done and the size of the file. Raises UnsupportedError where
     it needs a newer reader, AccessError where it cannot be read.
     """
-    with closing(open_bytes(target)) as source, error_context(path=source.name):
+    with ExitStack() as stack:
+        source = stack.enter_context(closing(open_bytes(target)))
+        stack.enter_context(error_context(path=source.name))
         if source.grows():
-            with open(target) as file:
-                return _check_quickly(file.container.source, progress)
-        return _check_quickly(source, progress)
-
-
-def _check_quickly(
-    source: ByteSource, progress: Callable[[int, int], object] | None
-) -> tuple[ChecksumReport, list[Problem]]:
-    seen = check_checksums(source, progress)
-    return seen, [Problem(at, heading(source, at), text) for at, text in seen.faults]
+            source = stack.enter_context(open(target)).container.source
+        seen = check_checksums(source, progress)
+        return seen, [Problem(at, heading(source, at), text) for at, text in seen.faults]
 
 
 Row = tuple[str, str, list[Problem]]  # kind, name and faults of a part of a file
@@ -148,9 +338,10 @@ def part_problems(file: File, clips: Sequence[Clip] | None = None) -> Iterator[R
 def _problems_of(shared: tuple[File, Sequence[str] | None], item: tuple[str, str]) -> list[Row]:
     (file, names), (kind, name) = shared, item
     if kind == "clip":
-        return [(kind, name, clip_problems(file, file.clips[name]))]
+        return [(kind, name, clip_problems(file.clips[name]))]
     if kind == "recovery data":
-        return [(kind, *row) for row in recovery_problems(file.container)]
+        source, chunks = file.container.source, recovery_chunks(file.container)
+        return [(kind, *_recovery_problems(source, chunk)) for chunk in chunks]
     if kind == "attachment":
         offset = file.container.directory.attachments[name].parts[0].offset
         return [(kind, name, _problems(offset, "ATTA", file.attachments[name].read))]
@@ -160,9 +351,7 @@ def _problems_of(shared: tuple[File, Sequence[str] | None], item: tuple[str, str
 def _skeleton_rows(file: File, clips: Sequence[Clip] | None) -> list[Row]:
     try:
         ids = None if clips is None else file.skeleton_ids(clips)
-        skeletons = [
-            (id_, skeleton) for id_, skeleton in file.skeletons if ids is None or id_ in ids
-        ]
+        skeletons = [one for one in file.skeletons if ids is None or one.id in ids]
     except MczError as error:
         return [("skeletons", "", [Problem(0, "SKEL", remark_of(error))])]
     rows: list[Row] = []
@@ -182,11 +371,11 @@ def _problems(offset: int, heading: str, work: Callable[[], object]) -> list[Pro
     return [Problem(offset, heading, remark_of(error)) for error in _errors_of(work)]
 
 
-def clip_problems(file: File, clip: Clip) -> list[Problem]:
+def clip_problems(clip: Clip) -> list[Problem]:
     """The faults of one clip: its values and its restored source."""
-    row = file.container.directory.clips[clip.name]
+    offset = clip.container.directory.clips[clip.name].clip.offset
     problems = [
-        Problem(row.clip.offset, _clip_heading(error), remark_of(error), error.clip)
+        Problem(offset, _clip_heading(error), remark_of(error), error.clip)
         for error in _clip_errors(clip)
     ]
     return list(dict.fromkeys(problems))
@@ -223,39 +412,9 @@ def _clip_heading(error: MczError) -> str:
     return "CEND" if isinstance(error, ChecksumError) else "CLIP"
 
 
-def recovery_chunks(container: Container) -> list[Chunk]:
-    """The RECV chunks of a file; without a clip no index lists them, and the file is walked."""
-    if container.directory.clips:
-        return container.directory.clips.ancillary(ChunkType.RECV)
-    return [chunk for chunk in scan(container.source).chunks if chunk.type == ChunkType.RECV]
-
-
-def recovery_problems(container: Container) -> Iterator[tuple[str, list[Problem]]]:
-    """Yield the protected bytes of each RECV, and its faults."""
-    for chunk in recovery_chunks(container):
-        try:
-            yield _check_recovery(container.source, chunk), []
-        except MczError as error:
-            yield f"at {chunk.offset}", [Problem(chunk.offset, "RECV", remark_of(error))]
-
-
-def _check_recovery(source: ByteSource, chunk: Chunk) -> str:
-    first = read_packet(source, chunk.payload_offset)
-    if first is None:
-        raise FormatError("its first packet is damaged", where=f"chunk {chunk.label}")
-    shape = first[0].shape
-    sizes = shape.chunk_offset, shape.payload_size
-    if sizes != (chunk.offset, chunk.length) or shape.stop > source.size:
-        raise FormatError(
-            f"it protects {shape}, not the bytes before and after it", where=f"chunk {chunk.label}"
-        )
-    _, packets = encode_packets(shape, lambda block: shape.block(block, source.read))
-    at = chunk.payload_offset
-    for packet in packets:
-        if source.read(at, len(packet)) != packet:
-            raise FormatError(
-                f"the packet at {at} does not match the protected bytes",
-                where=f"chunk {chunk.label}",
-            )
-        at += len(packet)
-    return f"bytes {shape.start} to {shape.stop}"
+def _recovery_problems(source: ByteSource, chunk: Chunk) -> tuple[str, list[Problem]]:
+    """The protected bytes of a RECV, and its faults."""
+    try:
+        return check_protection(source, chunk), []
+    except MczError as error:
+        return f"at {chunk.offset}", [Problem(chunk.offset, "RECV", remark_of(error))]

@@ -31,7 +31,7 @@ from mcz.errors import (
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Clips, Where, filter_clips, list_some
 from mcz.files.reading.lost_skeletons import restore_skeletons
-from mcz.files.reading.source_info import sourced_skeleton
+from mcz.files.reading.source_files import sourced_skeleton
 from mcz.model.motion import Skeleton
 from mcz.model.schema import parse
 from mcz.model.text_format import count_text, quote_name
@@ -215,7 +215,7 @@ class File:
             )
         try:
             data = FORMATS[source.format].write(skeleton)
-        except MotionError:  # printed anew, and the format cannot say it
+        except MotionError:  # printed again, and the format cannot hold it
             data = b""
         if data != source.template:
             raise FormatError(f"skeleton {id_.hex()}: its source file describes another skeleton")

@@ -53,9 +53,7 @@ def _with_positions(motion: Motion, values: Values) -> Motion:
     )
     metadata = {"source-note": SEPARATOR.join(filter(None, (notes, NOTE)))}
     filtered = replace(
-        motion,
-        signals=(signal, *motion.signals[1:]),
-        metadata=dict(motion.metadata) | metadata,
+        motion, signals=(signal, *motion.signals[1:]), metadata=dict(motion.metadata) | metadata
     )
     return filtered.without_source()
 

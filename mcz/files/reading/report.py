@@ -30,8 +30,7 @@ from mcz.files.reading.sizes import (
     models_used,
     ratios_of,
 )
-from mcz.files.reading.source_files import load, read_skeleton
-from mcz.files.reading.source_info import recording, source_facts
+from mcz.files.reading.source_files import load, read_skeleton, recording, source_facts
 from mcz.kinematics.rest_pose import figure_height
 from mcz.model.clock import time_facts
 from mcz.model.motion import Motion, Skeleton
@@ -187,11 +186,7 @@ def _facts_beside_values(clip: Clip) -> tuple[JsonObject, list[str]]:
     """Facts in source and signals, each None if its bytes are damaged; and these faults."""
     facts: JsonObject = {"times": None, "recording": None, "arrays": None}
     unread = []
-    for key, read in (
-        ("times", _times),
-        ("recording", _recording),
-        ("arrays", _arrays),
-    ):
+    for key, read in (("times", _times), ("recording", _recording), ("arrays", _arrays)):
         try:
             facts[key] = read(clip)
         except FormatError as error:

@@ -21,7 +21,7 @@ from mcz.container.model_records import numbers_of, whole_time_base
 from mcz.container.reader import Container
 from mcz.errors import FormatError, OptionError, UnsupportedError
 from mcz.files.reading.signal_info import SignalInfo, check_roles, read_signal
-from mcz.files.reading.source_info import (
+from mcz.files.reading.source_files import (
     SourceInfo,
     read_recording,
     scaling_of,

@@ -146,8 +146,7 @@ def _preview_frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray
         return frames, int(frames[1] - frames[0]) if len(frames) > 1 else 1
     if info.counts.n_resolutions == 1:
         raise OptionError(
-            f"codec {codec.name} stored it at a single resolution, so it has no preview",
-            clip=name,
+            f"codec {codec.name} stored it at a single resolution, so it has no preview", clip=name
         )
     step = 2 ** (info.counts.n_resolutions - 1)
     return np.arange(0, n_frames, step, dtype=np.int64), step

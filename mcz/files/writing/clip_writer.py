@@ -1,16 +1,15 @@
 """A planned clip -> chunks: its skeletons and models, CLIP, segments, CEND, its quality record.
 
-The clip is decoded from its final bytes before it ends. SPEC.md, "CEND", is normative.
+The clip is decoded from its final bytes before it ends; the record has the errors of a lossy codec,
+and its settings. SPEC.md, "CEND" and "QUAL", are normative; docs/reference/measures.md defines the
+figures.
 """
 
 from __future__ import annotations
 
 import io
-import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +28,9 @@ from mcz.container.model_records import (
 )
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
-from mcz.container.source import ByteSource, open_source
+from mcz.container.source import open_source
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, LimitError
-from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import SignalInfo, read_signal
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.files.reading.stored_clip import with_indices, with_names
@@ -45,10 +43,13 @@ from mcz.files.writing.planning import (
     clip_record,
     plan_clip,
 )
-from mcz.files.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.files.writing.signal_source import MemorySource
-from mcz.model.motion import Motion, Signal, Skeleton
-from mcz.model.types import Params, Progress, Values
+from mcz.kinematics.joint_names import find_feet
+from mcz.kinematics.metrics import compare
+from mcz.kinematics.metrics.sums import channel_errors
+from mcz.model.motion import Exceptions, Motion, Signal, Skeleton
+from mcz.model.schema import build
+from mcz.model.types import JsonObject, Params, Progress, Values
 from mcz.sources import FORMATS
 
 NO_HASH = bytes(32)
@@ -131,17 +132,6 @@ def _is_same_mask(given: NDArray[np.bool_] | None, decoded: NDArray[np.bool_] | 
     return np.array_equal(given, decoded)
 
 
-def check_values(stream: BinaryIO, names: Iterable[str]) -> None:
-    """Decode clips of the file in ``stream`` and compare their hashes, before it gets its name."""
-    stream.flush()
-    container = Container(ByteSource(stream), max_decoded=2**53)
-    for name in names:
-        clip = Clip(container, container.directory.clips[name])
-        for info in clip.signals:
-            clip.check_values(info.index)
-    stream.seek(0, os.SEEK_END)
-
-
 def write_skeletons(writer: Writer, skeletons: Sequence[StoredSkeleton]) -> bytes:
     """Write skeletons that the file does not have, and their names; return the id of the last."""
     id_ = b""
@@ -214,24 +204,23 @@ def write_plan(
     progress: Progress | None = None,
     *,
     quality: bool = True,
-    remarks: Mapping[str, str] = MappingProxyType({}),
     amend: Amend | None = None,
     copy: ClipCopy | None = None,
 ) -> dict[str, str] | None:
     """Write one clip: its skeletons and template if new, CLIP, segments, CEND, quality if lossy.
 
-    Returns the quality record, None if there is none. ``remarks`` are added to it, ``amend`` edits
-    it last. ``copy`` decodes the clip before it ends.
+    Returns the quality record, None if there is none; ``amend`` edits it last. ``copy`` decodes the
+    clip before it ends.
     """
     motion, codec = plan.motion, plan.codec
     decoded = _write_clip(writer, plan, copy or ClipCopy(writer.profile), progress)
     if not quality or codec.lossless:
         return None
     settings, values = codec.settings(plan.options), [signal.values for signal in decoded]
-    named = quality_record(motion, values, codec.name, settings, remarks)
+    named = quality_record(motion, values, codec.name, settings, plan.remarks)
     stored = with_indices(named, motion.skeleton)
     stored = amend(stored, values) if amend else stored
-    writer.ancillary(CHUNK, quality_payload(stored))
+    writer.ancillary(ChunkType.QUAL, quality_payload(stored))
     return with_names(stored, motion.skeleton)
 
 
@@ -321,3 +310,107 @@ def _segment(
     streams += segment.streams
     header = SegmentHeader(index, start, segment.n_frames, segment.lead, segment.tail, flags)
     return header, streams
+
+
+# Figures that a record omits to save bytes: the radius is 3 cm unless stated.
+NOT_STORED = ("max_channel_error", "max_channel_error_frame", "max_channel_error_channel")
+LEFT_OUT = (
+    *("shell_radius_cm", "shell_max_frame", "shell_max_joint"),
+    *("contact_frames", "slide_max_frame", "slide_max_joint"),
+    *("slide_path_mm", "slide_path_original_mm"),
+)
+
+
+def quality_record(
+    original: Motion,
+    decoded: Sequence[Values],
+    codec_name: str,
+    options: Params,
+    remarks: Mapping[str, str],
+) -> dict[str, str]:
+    """The entries of the record; ``decoded`` are the values of every signal as a reader has them.
+
+    If no point has a position, the entries ``NOT_STORED``, which are not metrics of the format,
+    have the greatest error of a channel.
+    """
+    signals = tuple(map(with_values, original.signals, decoded))
+    entries = quality_entries(original, replace(original, signals=signals), codec_name, options)
+    if "max_position_error" not in entries:
+        entries |= texts_of(_greatest_error(original, signals[0]))
+    return entries | dict(remarks)
+
+
+def _greatest_error(original: Motion, decoded: Signal) -> JsonObject:
+    """The greatest error of a channel, without whole turns, and its frame and channel."""
+    skeleton, signal = original.skeleton, original.signals[0]
+    given, decoded_values = (np.asarray(one.masked(), np.float64) for one in (signal, decoded))
+    with np.errstate(all="ignore"):  # overflow is no figure
+        errors = channel_errors(skeleton, signal, given, decoded_values)
+    errors[~np.isfinite(errors)] = -1.0
+    if not errors.size or errors.max() < 0:
+        return {}
+    row, column = divmod(int(errors.argmax()), errors.shape[1])
+    found_at = row // signal.samples_per_frame
+    own = signal.channels
+    name = skeleton.channel_addresses()[column] if own is None else own[column].label
+    figures = (float(errors[row, column]), found_at, name)
+    return dict(zip(NOT_STORED, figures, strict=True))
+
+
+def quality_payload(entries: Mapping[str, str]) -> bytes:
+    stored = {key: value for key, value in entries.items() if key not in NOT_STORED}
+    return build(payloads.Qual(entries=payloads.metadata_records(stored)), "quality record")
+
+
+def quality_entries(
+    original: Motion, decoded: Motion, codec_name: str, options: Params
+) -> dict[str, str]:
+    """Settings, then figures, as text; None is left out.
+
+    Numbers are the shortest decimals that read back as the same binary64.
+    """
+    settings = {f"param.{name}": value for name, value in options.items()}
+    return texts_of({"codec": codec_name, **settings, **figures(original, decoded)})
+
+
+def figures(original: Motion, decoded: Motion) -> JsonObject:
+    """The figures of a record by their metric ids, rounded; None where there is none."""
+    contacts = bool(find_feet(original.skeleton))
+    entries = compare(original, decoded, contacts=contacts).entries()
+    # Ten significant digits are more than measures agree on, in fewer bytes.
+    return {
+        key: float(f"{value:.10g}") if isinstance(value, float) else value
+        for key, value in entries.items()
+        if key not in LEFT_OUT
+    }
+
+
+def texts_of(entries: Params) -> dict[str, str]:
+    """Settings or figures as text, without those that are None."""
+    return {key: _text(value) for key, value in entries.items() if value is not None}
+
+
+def with_values(signal: Signal, values: Values) -> Signal:
+    """``signal`` with decoded values, which need not lie on its grids."""
+    return replace(
+        signal,
+        values=np.asarray(values, np.float64),
+        grids=(),
+        grid_changes=(),
+        exceptions=Exceptions(),
+        ordinals=None,
+    )
+
+
+def _text(value: object) -> str:
+    """
+    >>> _text(0.1), _text(3), _text(True), _text((1.0, -0.5))
+    ('0.1', '3', 'true', '1.0,-0.5')
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, (tuple, list)):
+        return ",".join(map(_text, value))
+    return str(value)

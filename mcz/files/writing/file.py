@@ -1,7 +1,7 @@
 """``mcz.write``, ``mcz.encode`` and ``mcz.to_npz``: one motion, or one source file, to a new file.
 
-The path of a motion: ``prepare`` converts it for its codec, ``tuning`` finds the parameters that
-meet a target, ``planning`` decides on the chunks of a clip, ``clip_writer`` writes them.
+The path of a motion: ``prepare`` converts it for its codec, ``tuned_plan`` finds the parameters
+that meet a target and decides on the chunks of the clip, ``write_plan`` encodes and writes them.
 ``SourceEncoder`` brings a source file that far; archives have one for each of their files.
 """
 
@@ -29,8 +29,8 @@ from mcz.files.reading.source_files import (
     parse_rate,
     read_bytes,
     read_skeleton,
+    stating_rate,
 )
-from mcz.files.reading.source_info import stating_rate
 from mcz.files.tables import table_of
 from mcz.files.tables import to_npz as npz_of
 from mcz.files.writing.atomic import (
@@ -41,7 +41,7 @@ from mcz.files.writing.atomic import (
     refuse_inputs,
     replacing,
 )
-from mcz.files.writing.clip_writer import write_skeletons
+from mcz.files.writing.clip_writer import write_plan, write_skeletons
 from mcz.files.writing.planning import (
     StoredSkeleton,
     prepare,
@@ -49,7 +49,7 @@ from mcz.files.writing.planning import (
     under_its_path,
     with_true_sources,
 )
-from mcz.files.writing.tuning import write_motion
+from mcz.files.writing.tuning import tuned_plan
 from mcz.hints import Hint, Remark
 from mcz.kinematics.rest_pose import height_note
 from mcz.model.clock import SAME_RATE
@@ -160,11 +160,12 @@ class SourceEncoder:
             motion = stating_rate(motion)
         base = None if taken.skeleton is None else self._store_skeleton(taken.skeleton)
         prepared = prepare(motion, codec, params, stored_with_base(motion.skeleton, base))
-        self.quality = write_motion(writer, prepared, codec, params, progress)
+        plan = tuned_plan(prepared, codec, params, writer.profile)
+        self.quality = write_plan(writer, plan, progress)
         return "parsed"
 
     def _keep_notes(self, taken: ReadMotion, motion: Motion) -> None:
-        """Keep what is odd about a file once the options have told what it left open."""
+        """Keep what is odd about a file once the options have added what it left open."""
         self.remark = taken.remark
         keys = ("source-note", *(() if taken.skeleton is not None else (NOTE,)))
         notes = (motion.metadata.get(key, "") for key in keys)
@@ -295,12 +296,13 @@ def write(
     if not isinstance(motion, Motion):
         raise OptionError(f"the first argument must be a motion, not {type(motion).__name__}")
     check_metadata(motion.metadata, motion.name)
-    codec_options = encoding_options(codec, effort, params).selected_codec
-    motion = with_true_sources(motion, lossless=codec_options.lossless)
-    prepared = prepare(motion, codec_options, params, (under_its_path(motion.skeleton),))
+    chosen, limits = codec_by_name(choose_name(codec, effort)), profile_named(profile)
+    motion = with_true_sources(motion, lossless=chosen.lossless)
+    prepared = prepare(motion, chosen, params, (under_its_path(motion.skeleton),))
     with limit_threads(threads), replacing(target, force=force, inputs=params.values()) as stream:
-        writer = Writer(stream, profile=profile_named(profile), copies=copies)
-        quality = write_motion(writer, prepared, codec_options, params, progress)
+        plan = tuned_plan(prepared, chosen, params, limits)
+        writer = Writer(stream, profile=limits, copies=copies)
+        quality = write_plan(writer, plan, progress)
         writer.finish()
     return summarize(writer.directory, writer.offset, quality)
 

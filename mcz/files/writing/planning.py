@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ from mcz.container.limits import LARGE, Profile, check
 from mcz.container.model_records import channel_records, put_time_base, time_base_of
 from mcz.container.scanner import is_plain_path
 from mcz.errors import MotionError, OptionError
-from mcz.files.reading.source_info import stating_rate
-from mcz.files.writing.signal_bounds import of_codec
+from mcz.files.reading.source_files import stating_rate
 from mcz.files.writing.signal_source import MemorySource, as_stored, group_kind, settle
 from mcz.kinematics import point_set
 from mcz.kinematics.points import in_positions
@@ -30,6 +29,7 @@ from mcz.model.types import JsonObject, Params
 from mcz.model.units import axes_of
 from mcz.sources import FORMATS
 
+MAX_ERROR, MEAN_ERROR = "max_error", "mean_error"
 FURTHER_CODEC = "fast"  # of all signals other than the motion, if its codec is lossy
 
 
@@ -62,7 +62,7 @@ def prepare(
     ``skeletons`` are those of ``Prepared``, of the given motion. Raises OptionError where positions
     have no meaning, MotionError where there are none.
     """
-    options = codec.options(of_codec(params))
+    options = codec.options(split_bounds(params)[0])
     skeletons = skeletons or (StoredSkeleton(motion.skeleton),)
     if not wants_positions(codec, options, motion.skeleton):
         return Prepared(motion, skeletons)
@@ -71,6 +71,17 @@ def prepare(
     if made is motion:
         return Prepared(motion, skeletons)
     return Prepared(made, (*skeletons, StoredSkeleton(made.skeleton, derives=True)))
+
+
+def split_bounds(params: Params) -> tuple[JsonObject, JsonObject]:
+    """The parameters of a codec, and bounds of signals other than the motion."""
+    bounds = {key: value for key, value in params.items() if _is_bound(key)}
+    return {key: value for key, value in params.items() if key not in bounds}, bounds
+
+
+def _is_bound(key: str) -> bool:
+    name, _, error = key.rpartition(".")
+    return bool(name) and error in (MAX_ERROR, MEAN_ERROR)
 
 
 def stored_with_base(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[StoredSkeleton, ...]:
@@ -191,13 +202,14 @@ class ClipPlan:
     """A clip in stored form, in the order of its chunks.
 
     ``prepared`` has the values that a file stores; ``models`` are payloads of MODL. ``options`` are
-    those of the motion's codec.
+    those of the motion's codec, ``remarks`` further entries of its quality record.
     """
 
     prepared: Prepared
     options: Params
     models: tuple[bytes, ...]
     signals: tuple[SignalPlan, ...]
+    remarks: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def motion(self) -> Motion:
@@ -274,7 +286,7 @@ def _signal_plan(
 
 def _model_payloads(encoded: Encoded, profile: Profile) -> Iterator[bytes]:
     """Models that a signal needs, with well-known ones if all shall be in the file."""
-    known = encoded.known if profile is LARGE else ()
+    known = encoded.known_models if profile is LARGE else ()
     for model in (*encoded.models, *known):
         yield build(payloads.Modl(kind=model.kind, data=model.data), "MODL")
 

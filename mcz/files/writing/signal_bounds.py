@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from mcz.codecs.coding.fast.encoder import channel_bytes
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError
+from mcz.files.writing.planning import MAX_ERROR, MEAN_ERROR
 from mcz.kinematics.metrics.comparison import named_signals, signal_errors
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal, Skeleton, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
-from mcz.model.types import Bools, Floats, JsonObject, Params
+from mcz.model.types import Bools, Floats, Params
 from mcz.model.units import unit_ratio
 from mcz.sources import recording_of, with_analog_scales
 
@@ -34,24 +35,11 @@ TRIALS = 10
 GOOD_ENOUGH = 0.97  # of a requested mean error: near enough
 
 
-def of_codec(params: Params) -> JsonObject:
-    """``params`` without bounds of signals."""
-    return {key: value for key, value in params.items() if not _is_bound(key)}
-
-
-def _is_bound(key: str) -> bool:
-    name, _, error = key.rpartition(".")
-    return bool(name) and error in (MAX_ERROR, MEAN_ERROR)
-
-
-def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, dict[str, str]]:
-    """``motion`` with coarser signals as the bounds among ``params`` allow.
+def with_bounds(motion: Motion, codec: Codec, asked: Params) -> tuple[Motion, dict[str, str]]:
+    """``motion`` with coarser signals as the bounds ``asked`` for allow.
 
     Also returns entries of the quality record. Raises OptionError for a bad bound.
     """
-    asked = {key: value for key, value in params.items() if _is_bound(key)}
-    if not asked:
-        return motion, {}
     if codec.lossless:
         raise OptionError(
             f"{next(iter(asked))}: codec {codec.name} is lossless; choose a lossy codec "
@@ -282,7 +270,6 @@ def _rescale(column: Column, step: float) -> Column | None:
     return replace(rescaled, numbers=words, values=rescaled.values_of(words))
 
 
-MAX_ERROR, MEAN_ERROR = "max_error", "mean_error"
 _BOUND = re.compile(r"([0-9.]+(?:[eE][-+]?[0-9]+)?) ?([^\s0-9.,].*)?")
 LENGTHS = (*POSITION_KINDS, "length")
 

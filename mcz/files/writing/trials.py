@@ -22,10 +22,8 @@ from mcz.container.source import open_source
 from mcz.errors import ContactWarning, MotionError, OptionError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.sizes import clip_sizes
-from mcz.files.writing.clip_writer import Trial, write_trial
-from mcz.files.writing.planning import Prepared
-from mcz.files.writing.quality import with_values
-from mcz.files.writing.signal_bounds import MEAN_ERROR
+from mcz.files.writing.clip_writer import Trial, with_values, write_trial
+from mcz.files.writing.planning import MEAN_ERROR, Prepared
 from mcz.kinematics import positions_of
 from mcz.kinematics.joint_names import find_joints
 from mcz.kinematics.metrics import Comparison, compare

@@ -15,18 +15,18 @@ import numpy as np
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import Dial
 from mcz.container.limits import Profile
-from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
-from mcz.files.writing.clip_writer import Amend, write_plan
-from mcz.files.writing.planning import Prepared, check_bones, find_targets, plan_clip
-from mcz.files.writing.signal_bounds import (
+from mcz.files.writing.planning import (
     MAX_ERROR,
     MEAN_ERROR,
-    limits_of,
-    of_codec,
-    parse_bound,
-    with_bounds,
+    ClipPlan,
+    Prepared,
+    check_bones,
+    find_targets,
+    plan_clip,
+    split_bounds,
 )
+from mcz.files.writing.signal_bounds import limits_of, parse_bound, with_bounds
 from mcz.files.writing.trials import (
     QUALITY,
     REFINEMENT,
@@ -40,7 +40,7 @@ from mcz.files.writing.trials import (
 from mcz.hints import Hint
 from mcz.kinematics import positions_of
 from mcz.model.motion import Motion
-from mcz.model.types import JsonObject, Params, Progress
+from mcz.model.types import JsonObject, Params
 
 PRESET, LIMITS = "preset", "limits"
 GOAL = 0.985  # of a target: near enough to stop
@@ -59,25 +59,19 @@ Point = tuple[float, float]  # a setting and its figure
 Bracket = tuple[Point, Point, bool]  # one that meets the target, one that misses, if a range ended
 
 
-def write_motion(
-    writer: Writer,
-    prepared: Prepared,
-    codec: Codec,
-    params: Params,
-    progress: Progress | None = None,
-    *,
-    amend: Amend | None = None,
-) -> dict[str, str] | None:
-    """Write a clip after meeting a size or an error among ``params``.
+def tuned_plan(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> ClipPlan:
+    """The plan of a clip that meets the size or the error among ``params``.
 
-    Returns the quality record, which ``amend`` edits last; None if there is none. Raises
-    OptionError where a target cannot be met or has no meaning for this clip.
+    Raises OptionError where a target cannot be met or has no meaning for this clip, and as
+    ``plan_clip``.
     """
-    motion, bounded_signals = with_bounds(prepared.motion, codec, params)
-    options, remarks = tune(motion, codec, of_codec(params), writer.profile)
-    plan = plan_clip(replace(prepared, motion=motion), codec, options, writer.profile)
-    remarks |= bounded_signals
-    return write_plan(writer, plan, progress, remarks=remarks, amend=amend)
+    asked, bounds = split_bounds(params)
+    motion, bounded = (
+        with_bounds(prepared.motion, codec, bounds) if bounds else (prepared.motion, {})
+    )
+    options, remarks = tune(motion, codec, asked, profile)
+    plan = plan_clip(replace(prepared, motion=motion), codec, options, profile)
+    return replace(plan, remarks=remarks | bounded)
 
 
 def tune(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Tuned:
@@ -172,7 +166,7 @@ def _search_dial(dial: Dial, target: Target, trial: Trials) -> Tuned:
         why = f"no {dial.parameter} that was tried is nearer"
         why = f"the range of {dial.parameter} ends there" if ended else why
         remarks["target_remark"] = f"{target.name} {target.limit:g}: {reached:g} was reached; {why}"
-    return {dial.parameter: int(setting) if dial.whole else setting}, remarks
+    return {dial.parameter: int(setting) if dial.is_integer else setting}, remarks
 
 
 def _target(motion: Motion, dial: Dial, options: Params, targets: Params) -> Target:
@@ -223,11 +217,11 @@ def search(
         return *meets, True
     for _ in range(MOST_TRIALS):
         low, high = sorted((meets[0], misses[0]))
-        is_next = high / low < CLOSE or (dial.whole and high - low <= 1)
+        is_next = high / low < CLOSE or (dial.is_integer and high - low <= 1)
         if meets[1] >= GOAL * target.limit or is_next:
             break
         setting = _between(meets, misses, target.limit)
-        if dial.whole:  # strictly between the two
+        if dial.is_integer:  # strictly between the two
             setting = min(max(round(setting), low + 1), high - 1)
         point = setting, _measure_figure(dial, measured, target, setting)
         if point[1] <= target.limit:
@@ -248,7 +242,7 @@ def _search_beside(
     middle = best[0]
     for power in range(1, NEIGHBORS + 1):
         beside = (middle * NEAR_FACTOR**power, middle / NEAR_FACTOR**power)
-        if dial.whole:
+        if dial.is_integer:
             beside = (middle + power, middle - power)
         for setting in beside:
             if dial.low <= setting <= dial.high:
@@ -298,7 +292,7 @@ def _follow_guesses(
     aim = AIM * target.limit
     meets: Point | None = None
     misses: Point | None = None
-    setting = dial.guess(target.name, aim) if dial.guess and not dial.whole else None
+    setting = dial.guess(target.name, aim) if dial.guess and not dial.is_integer else None
     for _ in range(MOST_GUIDED):
         if setting is None or not dial.low < setting < dial.high:
             return None
@@ -320,7 +314,7 @@ def _measure_figure(
 ) -> float:
     """The figure of a setting; one that the codec refuses as too fine has an infinite size."""
     try:
-        return measure(target, int(setting) if dial.whole else setting)
+        return measure(target, int(setting) if dial.is_integer else setting)
     except MotionError as error:
         if setting > 1 if dial.rises else setting < 1:
             if target.falls:
@@ -330,7 +324,7 @@ def _measure_figure(
 
 
 def _fit_range(dial: Dial, setting: float) -> float:
-    return min(max(round(setting) if dial.whole else setting, dial.low), dial.high)
+    return min(max(round(setting) if dial.is_integer else setting, dial.low), dial.high)
 
 
 def _between(meets: Point, misses: Point, limit: float) -> float:

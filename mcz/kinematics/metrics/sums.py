@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from mcz.kinematics import point_names, point_set
 from mcz.kinematics.angles import without_turns, without_whole_turns
 from mcz.model.motion import Channel, Signal, Skeleton
-from mcz.model.types import Bools, Floats
+from mcz.model.types import Bools, Floats, Settings
 
 Number = float | None
 
@@ -218,3 +219,58 @@ def squared_norms(vectors: Floats) -> Floats:
     x, y, z = np.moveaxis(vectors, 2, 0)
     result: Floats = x * x + y * y + z * z
     return result
+
+
+class RunningFigures:
+    """The errors of a quality record, frame by frame: of values and, of markers, of positions."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+        self._positions = bool(skeleton.joints) and point_set(skeleton) == "markers"
+        self._frames = self._values = self._points = 0
+        self._squares = self._sum = 0.0
+        self._most = -1.0
+        self._where: tuple[int, int] | None = None
+
+    def add(self, given: Floats, decoded: Floats) -> None:
+        """Add a frame; NaN in ``given`` does not count."""
+        with np.errstate(all="ignore"):  # overflow is no figure
+            squares = np.square(decoded - given)
+            self._squares, self._values = _add_valid(self._squares, self._values, squares)
+            if self._positions:
+                distances = np.sqrt(squares.reshape(-1, 3).sum(axis=1))
+                self._sum, self._points = _add_valid(self._sum, self._points, distances)
+                distances[np.isnan(distances)] = -1.0
+                point = int(distances.argmax())
+                if distances[point] > self._most:
+                    self._most, self._where = float(distances[point]), (self._frames, point)
+        self._frames += 1
+
+    def entries(self) -> Settings:
+        """The figures by their metric ids, None where there is none."""
+        unit = self.skeleton.unit_cm
+        figures: Settings = {"frames": self._frames, "channels": self.skeleton.n_channels}
+        figures["mse_raw"] = self._squares / self._values if self._values else None
+        if self._positions and self._where is not None:
+            mean, (frame, point) = self._sum / self._points, self._where
+            figures |= {
+                "point_set": point_set(self.skeleton),
+                "points": self.skeleton.n_joints,
+                "unit_cm": unit,
+                "mean_position_error": mean,
+                "mean_position_error_cm": mean * unit if unit is not None else None,
+                "max_position_error": self._most,
+                "max_position_error_cm": self._most * unit if unit is not None else None,
+                "max_position_error_frame": frame,
+                "max_position_error_point": point_names(self.skeleton)[point],
+            }
+        return {k: v for k, v in figures.items() if not isinstance(v, float) or np.isfinite(v)}
+
+
+def _add_valid(total: float, count: int, more: Floats) -> tuple[float, int]:
+    """Add the values of ``more`` that are not NaN to a sum and a count."""
+    added = float(more.sum())
+    if added == added:
+        return total + added, count + more.size
+    valid = ~np.isnan(more)
+    return total + float(more[valid].sum()), count + int(np.count_nonzero(valid))

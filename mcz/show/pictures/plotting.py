@@ -213,7 +213,7 @@ def _points(motion: Motion, name: str, report: Callable[[int, str], None]) -> li
 def _settings(dial: Dial) -> list[float]:
     middle = (dial.guess and dial.guess("mean_error_cm", MIDDLING_CM)) or 1.0
     settings = [min(max(middle * step, dial.low), dial.high) for step in STEPS]
-    return list(dict.fromkeys(max(1, round(s)) if dial.whole else s for s in settings))
+    return list(dict.fromkeys(max(1, round(s)) if dial.is_integer else s for s in settings))
 
 
 def _try_setting(motion: Motion, codec: Codec, setting: float) -> tuple[int, Comparison]:

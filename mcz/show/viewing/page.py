@@ -297,8 +297,9 @@ def _cut(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
 
 def _coded(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
     from mcz.container.writer import Writer
+    from mcz.files.writing.clip_writer import write_plan
     from mcz.files.writing.planning import prepare, under_its_path
-    from mcz.files.writing.tuning import write_motion
+    from mcz.files.writing.tuning import tuned_plan
 
     codec, params = (
         codec_by_name(choose_name(options.codec, options.effort)),
@@ -310,7 +311,7 @@ def _coded(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
         for clip in file.chosen(options.clips or None, options.where):
             motion = registry.with_facts(clip.motion())
             prepared = prepare(motion, codec, params, (under_its_path(motion.skeleton),))
-            write_motion(writer, prepared, codec, params)
+            write_plan(writer, tuned_plan(prepared, codec, params, writer.profile))
         writer.finish()
     return out.getvalue()
 

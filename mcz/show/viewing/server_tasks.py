@@ -248,7 +248,7 @@ def dial_of(dial: Dial | None) -> JsonObject | None:
         "low": dial.low,
         "high": dial.high,
         "rises": dial.rises,
-        "whole": dial.whole,
+        "whole": dial.is_integer,
     }
 
 

@@ -58,7 +58,9 @@ def code(motion: Motion, options: Mapping[str, Any]) -> Coded:
     source = MemorySource(motion, 0, codec, BASE.segment_bytes)
     encoded = codec.encode(source, codec.options(options))
     segments: list[Segment] = list(encoded.segments)
-    layout = replace(source.layout, find_model=model_finder((*encoded.models, *encoded.known)))
+    layout = replace(
+        source.layout, find_model=model_finder((*encoded.models, *encoded.known_models))
+    )
     spans = [Span(s.first, s.n_frames, 0, 0, s.fresh) for s in segments]
     request = Request(0, motion.n_frames, (0,))
 

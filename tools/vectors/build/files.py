@@ -104,7 +104,7 @@ def _lossy(
     part: SignalPlan, segments: Sequence[tuple[SegmentHeader, Sequence[bytes]]], free: Any
 ) -> Any:
     encoded, layout = part.encoded, part.source.layout
-    models = model_finder((*encoded.models, *encoded.known))
+    models = model_finder((*encoded.models, *encoded.known_models))
     layout = replace(layout, n_resolutions=encoded.n_resolutions, find_model=models)
     spans = [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h, _ in segments]
     n_groups = len(layout.groups)

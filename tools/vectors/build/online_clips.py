@@ -64,7 +64,7 @@ def codec_of(plan: Plan, coding: type[Coding] = Coding) -> Any:
 
     def encode(source: Any, params: Any) -> Encoded:
         made = iter(segments_of(plan, coding))
-        return Encoded(header(plan), made, models=own, known=known, preset=plan.preset)
+        return Encoded(header(plan), made, models=own, known_models=known, preset=plan.preset)
 
     def decode(header: bytes, layout: Any, spans: Any, request: Any, fetch: Any) -> Floats:
         return values_of(plan)[request.start : request.stop]

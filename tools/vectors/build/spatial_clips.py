@@ -227,7 +227,7 @@ def codec_of(plan: Plan) -> Codec:
     known = (model,) if model and plan.known else ()
 
     def encode(source: Any, params: Any) -> Encoded:
-        return Encoded(header(plan), iter(segments_of(plan)), models=own, known=known)
+        return Encoded(header(plan), iter(segments_of(plan)), models=own, known_models=known)
 
     codec = codec_by_name(plan.codec)
     return replace(codec, encode=encode, parameters=raw.CODEC.parameters, dial=None, grouping="all")
