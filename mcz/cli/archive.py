@@ -74,7 +74,7 @@ def pack_command(
     if mtimes:
         options["mtimes"] = True
     with errors_about(folder), Progress() as progress:
-        report = _packing(scheduler)(
+        report = _pack_function(scheduler)(
             folder,
             target,
             keep_all=keep_all,
@@ -86,7 +86,7 @@ def pack_command(
     return print_file_results(report, target, as_json)
 
 
-def _packing(scheduler: str | None) -> Callable[..., Report]:
+def _pack_function(scheduler: str | None) -> Callable[..., Report]:
     """The ``pack`` function: local, or on a Dask scheduler."""
     if scheduler is None:
         from mcz.files.editing.archive import pack

@@ -172,7 +172,7 @@ def decode(
         check_signal(options)
     outputs: list[Output] = []
     summaries: dict[str, ConversionSummary] = {}
-    with given.opened() as (opened, inputs):
+    with given.open_file() as (opened, inputs):
         for clip in _select_clips(opened, output, names, where):
             clip_options = _with_target(clip, output, options, salvage)
             parts, summaries[clip.name] = clip_outputs(opened, clip, clip_options)

@@ -141,7 +141,7 @@ class Input:
         return given, options._replace(unit=None, up=None, rate=None)
 
     @contextmanager
-    def opened(self) -> Iterator[tuple[File, tuple[str, ...]]]:
+    def open_file(self) -> Iterator[tuple[File, tuple[str, ...]]]:
         """The open .mcz, of a source file one in memory; and the files that were read for it."""
         if not self.is_source:
             options = {"salvage": self.salvage, "unverified": self.unverified, "verify": True}

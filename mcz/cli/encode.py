@@ -151,11 +151,11 @@ def _encode_file(
     if sink is not None:
         sink.write(piped.getvalue())
     if not unread:
-        _tell(target, written, as_json)
+        _print_result(target, written, as_json)
     return Exit.FINE
 
 
-def _tell(target: str, written: Written, as_json: bool) -> None:
+def _print_result(target: str, written: Written, as_json: bool) -> None:
     from mcz.container.limits import output_limit
 
     needed, allowed = max(written.decoded_bytes, written.source_bytes), output_limit(written.size)

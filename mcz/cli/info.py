@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mcz.cli import shared_options
+from mcz.cli.command_groups import StrictCommand
 from mcz.cli.common import (
     EXIT_CODES,
     OPTION_HINTS,
@@ -32,7 +33,6 @@ from mcz.cli.info_lines import (
     skeleton_lines,
     time_lines,
 )
-from mcz.cli.lazy import StrictCommand
 from mcz.cli.terminal import echo, is_terminal, plural, print_json, say, table
 from mcz.cli.verify import is_malformed
 from mcz.errors import FormatError, MczError

@@ -31,7 +31,7 @@ def is_cheap(clip: Any) -> bool:
 def motion_energy(moving: MotionLike, cells: int = CELLS) -> Floats | None:
     """The mean speed of all points in ``cells`` equal parts of the frames, float64 (n,).
 
-    In length units a second, or a frame where times are unknown; NaN where no position is known. No
+    In length units a second, or a frame if times are unknown; NaN where no position is known. No
     step is taken across a break in time; with fewer frames there are fewer parts. Of a clip with
     more segments than parts one segment a part is decoded. None without kinematics, or with fewer
     than two frames.
@@ -50,7 +50,7 @@ def motion_energy(moving: MotionLike, cells: int = CELLS) -> Floats | None:
 
 
 def _seconds(moving: MotionLike) -> Floats:
-    """Seconds from each frame to the next, NaN across a break; 1 where times are unknown."""
+    """Seconds from each frame to the next, NaN across a break; 1 if times are unknown."""
     timeline = moving.timeline
     return np.ones(moving.n_frames - 1) if timeline is None else timeline.steps
 
@@ -374,7 +374,7 @@ def bars_of(payload: Sequence[JsonObject]) -> tuple[list[Bar], list[Bar]]:
     )
     if len(groups) == 1:
         ((_, parts),) = groups.items()
-        return [(_called(resolution), n) for resolution, n in parts.items()], []
+        return [(_part_name(resolution), n) for resolution, n in parts.items()], []
     sums = {name: sum(parts.values()) for name, parts in groups.items()}
     ordered = sorted(sums.items(), key=lambda each: -each[1])
     rest = ordered[MOST_BARS:]
@@ -382,7 +382,7 @@ def bars_of(payload: Sequence[JsonObject]) -> tuple[list[Bar], list[Bar]]:
     return ordered[:MOST_BARS], others
 
 
-def _called(resolution: int | None) -> str:
+def _part_name(resolution: int | None) -> str:
     if resolution is None:
         return "exceptions, masks"
     return f"resolution {resolution}" + (", coarsest" if resolution == 0 else "")

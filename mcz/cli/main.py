@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import click
 
 from mcz.cli import shared_options
+from mcz.cli.command_groups import lazy_group
 from mcz.cli.common import EXIT_CODES, Exit, Failure, errors_about, exists_error, run, write_output
-from mcz.cli.lazy import lazy_group
 from mcz.cli.terminal import echo, plural, print_json, table
 from mcz.model.types import JsonObject
 

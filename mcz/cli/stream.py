@@ -15,8 +15,8 @@ import click
 import numpy as np
 
 from mcz.cli import shared_options
+from mcz.cli.command_groups import lazy_group
 from mcz.cli.common import EXIT_CODES, OPTION_HINTS, Exit, Failure, errors_about, require_file
-from mcz.cli.lazy import lazy_group
 from mcz.cli.standard_input import (
     NAME,
     NUMBER,

@@ -112,14 +112,14 @@ def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **op
     _check_use(output, options, in_rerun)
     from mcz.show.viewing.file_registry import FileRegistry, add_path
 
-    def told(line: str) -> None:
+    def print_note(line: str) -> None:
         if as_json:
             say_json({"note": line})
         else:
             say(line)
 
     facts = {key: options[key] for key in FACT_OPTIONS}
-    registry = FileRegistry(facts, told, salvage=options["salvage"], hints=OPTION_HINTS)
+    registry = FileRegistry(facts, print_note, salvage=options["salvage"], hints=OPTION_HINTS)
     try:
         for path in files:
             with errors_about(path):

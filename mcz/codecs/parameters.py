@@ -129,7 +129,7 @@ def decimals_parameter(help_: str) -> Parameter:
 
 
 def preset_values(presets: Presets, params: Params) -> Settings:
-    """Values of a preset, each replaced by the caller's where given."""
+    """Values of a preset, each replaced by the caller's if given."""
     values = presets[params["preset"]].items()
     return {name: value if params[name] is None else params[name] for name, value in values}
 

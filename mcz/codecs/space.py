@@ -52,7 +52,7 @@ LAST, BEFORE, FAST, SLOW, TRACK_SIZE = range(5)  # remembered of a coefficient
 def code_frame(
     state: Ints, data: Bytes, indices: Ints, starts: Ints, lengths: Ints, tracks: Ints2, first: int
 ) -> int:
-    """Code ``indices`` (n_rows,) in place; 1 where that is impossible.
+    """Code ``indices`` (n_rows,) in place; 1 if that is impossible.
 
     ``lengths`` (n_matrices,) and ``tracks`` (n_rows, TRACK_SIZE) remember the frames before.
     """
@@ -85,11 +85,11 @@ def code_frame(
             indices[r] = fault
             higher, above = above, fault
     if first == 0:  # FRAME-08
-        remember(indices, tracks)
+        update_tracks(indices, tracks)
     return 0
 
 
-def remember(indices: Ints, tracks: Ints2) -> None:
+def update_tracks(indices: Ints, tracks: Ints2) -> None:
     for r in range(len(indices)):
         track, size = tracks[r], 16 * abs(indices[r])
         track[BEFORE] = track[LAST]
@@ -127,7 +127,7 @@ def coefficient_of(points: Floats, row: Floats) -> float:
 
 
 def index_of(coefficient: float, threshold: float) -> int:
-    """A coefficient in steps as an integer; MAX_INDEX + 1 where it is too large."""
+    """A coefficient in steps as an integer; MAX_INDEX + 1 if it is too large."""
     size = abs(coefficient)
     if not size <= MAX_INDEX:  # NaN too
         return MAX_INDEX + 1

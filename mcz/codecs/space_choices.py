@@ -176,7 +176,7 @@ def choose_space(name: str, sample: Sample, step: float, which: str, in_time: In
         model = learn_model(sample)
         candidates.append((_with_model(fields, model=model), _vectors(model)))
     if which not in WHICH:
-        model = _read(which)
+        model = _read_model(which)
         if not _fits(model, n_points):
             raise OptionError(f"{name}: the bases of {which} do not fit {n_points} points")
         candidates.append((_with_model(fields, model=model), _vectors(model)))
@@ -229,7 +229,7 @@ def _with_model(
     return Choice(fields, (model,) if model else (), (known,) if known else ())
 
 
-def _read(path: str) -> Model:
+def _read_model(path: str) -> Model:
     try:
         return read_bases(Path(path))
     except OSError as error:
@@ -304,7 +304,7 @@ def _expected_bytes(
     return bits / 8 * whole + sum(len(model.data) for model in models)
 
 
-def _which(text: object) -> str:
+def _parse_basis(text: object) -> str:
     if not isinstance(text, (str, Path)):
         raise OptionError(f"basis is {text!r}; it must be {', '.join(WHICH)} or a file name")
     return str(text)
@@ -327,7 +327,7 @@ BASIS = Parameter(
     "basis",
     "auto",
     f"{', '.join(WHICH)}, or a file that mcz train wrote",
-    in_range(f"{', '.join(WHICH)}, a path", _which),
+    in_range(f"{', '.join(WHICH)}, a path", _parse_basis),
 )
 CODER = Parameter(
     "coder",

@@ -57,14 +57,14 @@ class TrainingSet:
 def training_set(motions: Iterable[Motion]) -> TrainingSet:
     """The positions of ``motions``.
 
-    Raises MotionError where their points, their up axes or their known units differ, and for a
+    Raises MotionError if their points, their up axes or their known units differ, and for a
     motion without positions, or without a known one.
     """
     first: tuple[str, TrainingSet] | None = None
     clips: list[Floats] = []
     n_filled = 0
     for motion in motions:
-        positions = _of_one(motion)
+        positions = _set_of_motion(motion)
         if first is None:
             first = motion.name, positions
         _check_alike(first, (motion.name, positions))
@@ -77,7 +77,7 @@ def training_set(motions: Iterable[Motion]) -> TrainingSet:
     return replace(first[1], clips=tuple(clips), n_filled=n_filled)
 
 
-def _of_one(motion: Motion) -> TrainingSet:
+def _set_of_motion(motion: Motion) -> TrainingSet:
     skeleton = motion.skeleton
     points = positions(motion)
     if not points.shape[1]:
@@ -112,7 +112,7 @@ def _check_alike(first: tuple[str, TrainingSet], other: tuple[str, TrainingSet])
 def with_mirror_images(training: TrainingSet) -> TrainingSet:
     """``training`` and its mirror image: left and right swapped, x negated (z if x is up).
 
-    Raises OptionError where no two points have names that differ only in their side.
+    Raises OptionError if no two points have names that differ only in their side.
     """
     order = mirror_order(training.names)
     if order == list(range(len(order))):

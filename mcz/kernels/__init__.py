@@ -2,8 +2,8 @@
 
 A kernel is a function of numbers, arrays and NamedTuples of both (``types``), with all functions
 that it calls. The build declares their types in C and compiles them (``tools/kernels``); the same
-source runs as plain Python, 50 to 500 times slower, where nothing was compiled or where a source
-has changed since. SPEC.md's integers are of 64 bits and wrap around; Python's do not, and no kernel
+source runs as plain Python, 50 to 500 times slower, if nothing was compiled or a source has
+changed since. SPEC.md's integers are of 64 bits and wrap around; Python's do not, and no kernel
 relies on more.
 
 ``MCZ_LOOPS`` in the environment chooses: ``compiled``; ``checked``, compiled with an IndexError for

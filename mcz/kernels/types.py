@@ -46,9 +46,9 @@ def fit(
     is_written: bool,
     moved: Moved,
 ) -> Items:
-    """``given`` with this dtype and number of axes, aligned, contiguous where ``dense``.
+    """``given`` with this dtype and number of axes, aligned, contiguous if ``dense``.
 
-    It is copied where it is not so. A copy of an array that the kernel writes is noted in
+    It is copied if it is not so. A copy of an array that the kernel writes is noted in
     ``moved``, for ``restore``. Raises TypeError for other dtypes and for what is to be written and
     no array, ValueError for another number of axes and for a read-only array that is to be written.
     """
@@ -75,7 +75,7 @@ def fit(
 
 
 def items(given: Iterable[Any], are_integers: tuple[bool, ...]) -> tuple[Any, ...]:
-    """``given`` as a tuple; raises TypeError where an integer is none, ValueError by its length."""
+    """``given`` as a tuple; raises TypeError for a wrong item, ValueError by length."""
     return tuple(
         index(item) if is_integer else item
         for item, is_integer in zip(given, are_integers, strict=True)

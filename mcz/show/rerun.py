@@ -44,8 +44,8 @@ def to_rerun(
     Below ``entity``, by default the clip's name: ``points/NAME`` for every point of
     ``mcz.point_names``, ``bones/left``, ``right`` and ``middle`` as lines, and every plain scalar
     and every channel of another signal as a time series ``SIGNAL/NAME``; events as texts. Lengths
-    are in meters where the unit is known. The timeline ``frame`` has the source's frame numbers,
-    ``time`` the times of ``mcz.times``, where they are known. Missing values are absent. Positions
+    are in meters if the unit is known. The timeline ``frame`` has the source's frame numbers,
+    ``time`` the times of ``mcz.times``, if they are known. Missing values are absent. Positions
     are binary32, scalars binary64.
 
     Without ``recording`` a new one is created, which keeps all data until it has a sink; with one

@@ -12,8 +12,8 @@ import click
 import pytest
 
 import mcz
+from mcz.cli.command_groups import OTHER_NAMES
 from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, errors_about, run, write_output
-from mcz.cli.lazy import OTHER_NAMES
 from mcz.cli.main import COMMANDS, cli
 from mcz.cli.terminal import Progress, say, table
 from mcz.errors import AccessError, ChecksumError, ExistsError, MczError, OptionError

@@ -84,7 +84,7 @@ def _next(state: Ints, data: Bytes) -> int:
 
 
 def _put(state: Ints, data: Bytes, byte: int) -> None:
-    """Add a byte; where ``data`` is full it is only counted, and the caller tries a longer one."""
+    """Add a byte; if ``data`` is full, only count it, and the caller tries a longer one."""
     at = state[POSITION]
     state[POSITION] = at + 1
     if at < len(data):

@@ -152,7 +152,7 @@ BASIS = N_CONTEXTS, N_MIXERS
 
 @kernel
 def code_table(state: Ints, data: Bytes, table: Ints2, scales: Ints, is_basis: int) -> int:
-    """Code a table (rows, channels) in place, each row from its scale on; 1 where impossible."""
+    """Code a table (rows, channels) in place, each row from its scale on; 1 if impossible."""
     for row in range(len(table)):
         fast = slow = scales[row] << 4
         near = side_1 = side_2 = 0

@@ -41,7 +41,7 @@ class Plan:
     delta: int
     decimals: int | None
     step: float
-    lever: float  # of a length unit, where steps are scaled: a position counts as value / lever
+    lever: float  # of a length unit, if steps are scaled: a position counts as value / lever
     method: int
     closed: bool  # the bound applies to decoded points, not to those before rounding
     fewest: bool

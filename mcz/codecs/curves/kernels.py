@@ -31,7 +31,7 @@ FAST, SLOW, SIDE_1, SIDE_2, TRACK_SIZE = range(5)  # what is remembered of a cha
 def code_point(
     state: Ints, data: Bytes, point: Ints, predicted: Ints, tracks: Ints2, first: tuple[int, int]
 ) -> int:
-    """Code the channels of one control point in place; 1 where that is impossible."""
+    """Code the channels of one control point in place; 1 if that is impossible."""
     near, other = 0, 3
     for c in range(len(point)):
         track = tracks[c]
@@ -192,7 +192,7 @@ class Rule(NamedTuple):
     """Rule by which curves are fitted.
 
     ``closed``: ends and middle are rounded before the error is measured, so that the bound holds
-    for what is decoded; to multiples of 1 / ``per``, or of ``step`` where that is 0.
+    for what is decoded; to multiples of 1 / ``per``, or of ``step`` if that is 0.
     """
 
     method: int

@@ -189,7 +189,7 @@ def n_quadratic(n_references: int) -> int:
 
 @kernel
 def code_references(state: Ints, data: Bytes, references: Ints2) -> int:
-    """Code the references of all channels; return how many they are, -1 where one is bad."""
+    """Code the references of all channels; return how many they are, -1 if one is bad."""
     total = 0
     for channel in range(1, len(references)):
         own = references[channel]
@@ -250,7 +250,7 @@ def code_miss(state: Ints, data: Bytes, miss: int, memory: Ints, flow: Ints) -> 
     return code_residual(state, data, miss, scales, near, sides, RESIDUALS)
 
 
-def remember(miss: int, memory: Ints) -> None:
+def update_memory(miss: int, memory: Ints) -> None:
     size = 16 * abs(miss)  # BEST-15
     memory[FAST] += (size - memory[FAST]) >> 1
     memory[SLOW] += (size - memory[SLOW]) >> 5
@@ -262,12 +262,12 @@ def code_rest(state: Ints, data: Bytes, rest: int, memory: Ints, flow: Ints) -> 
     rest_code = code_miss(state, data, rest, memory, flow)
     if rest_code == FAULT or rest_code >> 31 != rest_code >> 63:  # BEST-14
         return FAULT
-    remember(rest_code, memory)  # BEST-13
+    update_memory(rest_code, memory)  # BEST-13
     return rest_code
 
 
 def echo_of(leads: Words2, place: int) -> int:
-    """The lead at ``place``, counted through from 1; of the other sign where that is below 0."""
+    """The lead at ``place``, counted through from 1; of the other sign if that is below 0."""
     at = abs(place) - 1
     n_channels = leads.shape[1]
     lead = int(leads[BEHIND + at // n_channels, at % n_channels])
@@ -348,7 +348,7 @@ def code_leads(
                     return row
                 size = bits(16 * abs(miss))
                 flow[NEAR] = (flow[NEAR] + size - bits(memories[channel, SLOW])) >> 1
-                remember(miss, memories[channel])
+                update_memory(miss, memories[channel])
                 flow[OTHER] = memories[channel, SIDE_1]
                 leads[BEHIND + row, channel] = wrapped(lead)
             lead_now = float(leads[BEHIND + row, channel])
@@ -372,7 +372,7 @@ def code_leads(
 def read_ordinals(tails: Tails, lattices: Ints2, leads: Words2, echoes: Ints2, out: Ints2) -> int:
     """Fill columns of ``out`` (rows, channels) from ``leads`` (rows, lanes) and tails.
 
-    Returns the lane that has no tail, -2 where bits are left, or -1.
+    Returns the lane that has no tail, -2 if bits are left, or -1.
     """
     bit, end = tails.bits[0], tails.ends[0]
     columns = tails.columns

@@ -103,7 +103,7 @@ def _check(echo: Echo, n_rows: int, may_echo: Sequence[bool]) -> None:
 def echo_table(echoes: Sequence[Echo], n_rows: int, n_channels: int) -> Ints:
     """Place that each number repeats, counted from 1, negative if the sign is flipped.
 
-    (n_rows, n_channels); 0 where a number is coded. Without echoes (0, n_channels).
+    (n_rows, n_channels); 0 if a number is coded. Without echoes (0, n_channels).
     """
     table = np.zeros((n_rows if echoes else 0, n_channels), np.int64)
     for echo in echoes:

@@ -90,7 +90,7 @@ def _ratio(code: int) -> float:
 
 
 def _code_step(state: Ints, data: Bytes, step: int, kind: int, memory: Ints, flags: int) -> int:
-    """Code the step of a frame against the one before; N_STEPS where it is none."""
+    """Code the step of a frame against the one before; N_STEPS if it is none."""
     if kind == INTRA:
         return number(state, data, step, 9)
     before = memory[LTR_STEP] if kind == LTR else memory[LAST_STEP]  # ONLINE-16
@@ -112,7 +112,7 @@ def _code_step(state: Ints, data: Bytes, step: int, kind: int, memory: Ints, fla
 def _code_golomb(
     state: Ints, data: Bytes, indices: Ints, sizes: IntColumn, starts: Ints, kind: int
 ) -> int:
-    """Code ``indices`` (n_rows,) in place, ``sizes`` those before; 1 where that is impossible."""
+    """Code ``indices`` (n_rows,) in place, ``sizes`` those before; 1 if that is impossible."""
     for m in range(len(starts) - 1):
         one = two = 0
         for r in range(starts[m], starts[m + 1]):
@@ -268,7 +268,7 @@ def _choose(
 ) -> tuple[int, float]:
     """Choose the step code next to ``wanted``, fill ``indices``; also return the mean square.
 
-    Where the step is not fixed it grows until no coefficient is too large.
+    If the step is not fixed, it grows until no coefficient is too large.
     """
     if target >= NEVER:
         indices[:] = 0

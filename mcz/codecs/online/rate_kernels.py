@@ -32,19 +32,19 @@ UNKNOWN = -1.0
 MOST_ALPHA = 200.0
 MOST_CARRY = 8.0  # groups' bits that may be left: what still frames do not need is not owed to all
 NEVER = 1e3  # log2 of a step with which all coefficients are 0
-FINEST, COARSEST = -8.0, 24.0  # log2 of other steps where a rate is held
+FINEST, COARSEST = -8.0, 24.0  # log2 of other steps if a rate is held
 INTRA_LEVELS = 3.0  # log2 of the steps that the largest coefficient of an intra coded LTR has
-FALL = 0.9  # of STEADY: log2 of the bits falls by so much where log2 of the step rises by 1
+FALL = 0.9  # of STEADY: log2 of the bits falls by so much if log2 of the step rises by 1
 FOLLOW = 2.0  # costs follow what frames cost by this share in a buffer's time
 LEAST_SHARE, LEAST_BITS = 0.1, 0.3  # of the bits of a group; of a frame
-FIRST_COST = 8.0  # of an LTR, where none is known, in costs of an STR
+FIRST_COST = 8.0  # of an LTR, if none is known, in costs of an STR
 
 # Rates are tabled by log2 of the step over the deviation: from -LOW on, PER_OCTAVE a doubling.
 LOW, PER_OCTAVE, N_RATES = 16.0, 16.0, 384
 
 
 def largest_of(values: Floats) -> float:
-    """The greatest magnitude; where one is not a number, neither is it."""
+    """The greatest magnitude; NaN if one is NaN."""
     largest = 0.0
     for value in values:
         size = abs(value)
@@ -115,7 +115,7 @@ def ltr_step(
 ) -> float:
     """log2 of the step of an LTR frame, of a group of ``n_frames``.
 
-    Where a rate is held, an intra coded one, which nothing predicts, is never wholly 0.
+    If a rate is held, an intra coded one, which nothing predicts, is never wholly 0.
     """
     step = _ltr_step(plan, coefficients, intra, n_frames, laplace)
     if plan[MODE] == MOD:

@@ -254,7 +254,7 @@ def principal_components(rest: Floats) -> tuple[Floats, Floats]:
     if n_channels <= n_frames:
         vectors = np.linalg.eigh(scaled.T @ scaled)[1].T
     else:
-        # The longest first: where one is nothing but rounding, as there always is when means have
+        # The longest first: if one is nothing but rounding, as there always is when means have
         # been taken away, it must not come back at unit length along another.
         spanned = (scaled.T @ np.linalg.eigh(scaled @ scaled.T)[1])[:, ::-1]
         vectors = np.linalg.qr(spanned)[0].T
@@ -288,7 +288,7 @@ def _decimal_grid(decimals: int) -> Grid:
 
 
 def _round_components(values: Floats, step: float, decimals: int | None) -> Ints:
-    """Integers, halves away from zero; raises MotionError where one is too large."""
+    """Integers, halves away from zero; raises MotionError if one is too large."""
     sizes = np.abs(values) / step if decimals is None else np.abs(values) * 10.0**decimals
     rounded = np.floor(sizes + 0.5)
     if not (rounded <= MAX_INDEX).all():

@@ -75,7 +75,7 @@ def _length(row: Ints) -> int:
 
 
 def _code_row(state: Ints, data: Bytes, row: Ints, length: int, above: Ints, side: Ints) -> int:
-    """Code the first ``length`` coefficients of a row; 1 where that is impossible."""
+    """Code the first ``length`` coefficients of a row; 1 if that is impossible."""
     last = before = side_1 = side_2 = 0
     n = len(row)
     for k in range(length):

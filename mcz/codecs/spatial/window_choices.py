@@ -243,9 +243,11 @@ def _bases(
         in_time = _round_vectors(clip_fit.courses, clip_fit.course_energies, asked.step)
     gains = _gains(windows, clip_fit, [len(b.shifts) for b in spatial], in_time, asked)
     ranks, n_frequencies = _counts(gains, spatial, in_time, asked)
-    bases: list[Basis | Floats] = [_first(b, r) for b, r in zip(spatial, ranks, strict=True)]
+    bases: list[Basis | Floats] = [
+        _truncate_basis(b, r) for b, r in zip(spatial, ranks, strict=True)
+    ]
     if in_time is not None:
-        in_time = _first(in_time, n_frequencies)
+        in_time = _truncate_basis(in_time, n_frequencies)
         used = int(np.flatnonzero(in_time.entries.any(axis=0)).max(initial=0)) + 1
         used = max(used, n_frequencies)
         bases.append(Basis(in_time.shifts, in_time.entries[:, :used]))
@@ -255,14 +257,14 @@ def _bases(
 
 
 def _round_vectors(vectors: Floats, energies: Floats, step: float) -> Basis:
-    """Round entries to the digits where a further digit would cost as much as it gains."""
+    """Round entries to the digits at which a further one would cost as much as it gains."""
     least = math.ceil(math.log2(vectors.shape[1]) / 2) + 1  # or a vector is rounded away
     sizes = np.sqrt(energies) / step
     digits = np.ceil(np.log2(np.maximum(sizes, 1.0)) - LESS_DIGITS)
     return round_vectors(vectors, np.clip(digits, least, MAX_SHIFT).astype(np.int64))
 
 
-def _first(basis: Basis, count: int) -> Basis:
+def _truncate_basis(basis: Basis, count: int) -> Basis:
     return Basis(basis.shifts[:count], basis.entries[:count])
 
 

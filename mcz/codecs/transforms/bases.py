@@ -168,9 +168,9 @@ def learn_basis(
 
     ``sparsity`` is the paper's P, the number of coefficients kept of each frame, 1 to J; ``start``
     is "dct", "haar" or an orthogonal matrix (J, J) with basis vectors as rows. At most
-    ``iterations`` with that sparsity, fewer where the objective has settled, after ``growth`` with
+    ``iterations`` with that sparsity, fewer if the objective has settled, after ``growth`` with
     each smaller one. The same input gives the same bytes on the same machine. Raises OptionError
-    where there is no frame or a value is not finite, and for a sparsity, a number or a start that
+    if there is no frame or a value is not finite, and for a sparsity, a number or a start that
     does not fit.
     """
     rows = _checked_frames(frames)
@@ -277,9 +277,9 @@ def start_basis(start: str | Floats, n_points: int) -> Floats:
 def haar_basis(n_points: int) -> Floats:
     """The orthonormal Haar transform of three levels, (J, J), for any number of points.
 
-    A level turns neighbors a, b into (a + b) / sqrt(2) and (a - b) / sqrt(2); where the number is
+    A level turns neighbors a, b into (a + b) / sqrt(2) and (a - b) / sqrt(2); if the number is
     odd, the last goes on to the next level as it is. Rows: what is left after the last level, then
-    the differences from the last level to the first. Fewer levels where one point is left.
+    the differences from the last level to the first. Fewer levels if one point is left.
     """
     approx: list[Floats] = list(np.eye(n_points))
     details: list[Floats] = []

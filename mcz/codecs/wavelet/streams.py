@@ -116,7 +116,7 @@ def code_details(
 MASK = (1 << 31) - 1  # a Lehmer generator: the same numbers on every machine
 
 
-def following(seed: int) -> int:
+def next_seed(seed: int) -> int:
     return seed * 48271 % MASK
 
 
@@ -144,20 +144,20 @@ def anneal(
     heat = hot
     state = 1 + seed % (MASK - 1)
     for _ in range(16):  # small seeds differ from the first move on
-        state = following(state)
+        state = next_seed(state)
     greatest = 1
     for c in range(n_channels):
         greatest = max(greatest, counts[c])
     for step in range(iterations):
-        state = following(state)
+        state = next_seed(state)
         giver = state % n_channels
-        state = following(state)
+        state = next_seed(state)
         taker = state % n_channels
-        state = following(state)
+        state = next_seed(state)
         left = iterations - step
         widest = 1 + greatest * left // (4 * iterations)
         moved = min(1 + state % widest, counts[giver], most[taker] - counts[taker])
-        state = following(state)
+        state = next_seed(state)
         heat *= cooling
         if giver == taker or moved <= 0:
             continue

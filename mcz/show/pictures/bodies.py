@@ -155,14 +155,14 @@ def figure_size(places: Floats) -> float:
     """
     extents = []
     for frame in places:
-        known = frame[near_others(frame)]
+        known = frame[are_near_others(frame)]
         if len(known) > 1:
             extents.append(float((known.max(axis=0) - known.min(axis=0)).max()))
     usual = float(np.median(extents)) if extents else 1.0
     return usual if usual > 0 else 1.0
 
 
-def near_others(nodes: Floats) -> Flags:
+def are_near_others(nodes: Floats) -> Flags:
     """Flags of the nodes of a frame, (n, 3), that are known and not far from all others."""
     known = are_known(nodes)
     if not known.any():
@@ -254,9 +254,9 @@ class Track:
 
 
 def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None) -> Track:
-    """The track of these frames, ascending; ``unit`` and ``up`` where the skeleton states none.
+    """The track of ascending frames; ``unit`` and ``up`` count if the skeleton states none.
 
-    Raises MotionError where the motion has no kinematics, no joint, no frame, or no known position.
+    Raises MotionError if the motion has no kinematics, no joint, no frame, or no known position.
     """
     skeleton = moving.skeleton
     if not skeleton.joints or not len(frames):
@@ -270,7 +270,7 @@ def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None)
     if not are_known(seen).any():
         raise unknown(moving)
     axis = skeleton.up_axis or up or guess_up_axis(body, seen)
-    seen = _turned(seen, axis)
+    seen = _turn_upright(seen, axis)
     body = remove_false_bones(body, seen)
     size = figure_size(seen[:, body.drawn_nodes])
     track = Track(
@@ -300,7 +300,7 @@ def _measure_track(track: Track) -> Track:
     lows, centers = [], []
     for _, places in track.blocks():
         for nodes in places[:, shown]:
-            known = nodes[near_others(nodes)]
+            known = nodes[are_near_others(nodes)]
             lows.append(known[:, 2].min() if len(known) else np.nan)
             centers.append(
                 (known.min(axis=0) + known.max(axis=0)) / 2 if len(known) else np.full(3, np.nan)
@@ -331,7 +331,7 @@ def _blocks(
         stop = max(at + 1, int(np.searchsorted(frames, frames[at] + longest)))
         first, last = int(frames[at]), int(frames[stop - 1]) + 1
         values = values_of(moving, (first, last), every)[::per_frame][frames[at:stop] - first]
-        places = _turned(body.places(values), up)
+        places = _turn_upright(body.places(values), up)
         with np.errstate(all="ignore"):
             places *= scale
             unseen = ~(np.abs(places) < FARTHEST)
@@ -340,7 +340,7 @@ def _blocks(
         at = stop
 
 
-def _turned(places: Floats, up: str) -> Floats:
+def _turn_upright(places: Floats, up: str) -> Floats:
     turned_places: Floats = (places * signs_of(up))[:, :, TURNS[up[-1]]]
     return turned_places
 

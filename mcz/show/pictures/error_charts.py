@@ -56,7 +56,7 @@ def errors_between(original: Motion, other: Motion) -> Errors:
     """Errors of ``other`` against ``original``: the figures of ``mcz diff``, and of each frame.
 
     Points in order if both have equally many, otherwise joints of the same names. Raises
-    MotionError where the two differ in frames, or have no position in common.
+    MotionError if the two differ in frames, or have no position in common.
     """
     figures = compare(original, other, virtual_markers=False, shell_cm=None)
     a, b = original.skeleton, other.skeleton

@@ -62,10 +62,10 @@ def bytes_chart(clip: Clip) -> Chart:
     ordered = sorted(groups.items(), key=lambda each: -sum(each[1].values()))
     if len(groups) == 1 and len(sorts) > 1:  # of a single group the resolutions are shown
         ((_, own),) = ordered
-        bars: list[tuple[str, Parts]] = [(called(sort), {sort: own[sort]}) for sort in sorts]
+        bars: list[tuple[str, Parts]] = [(part_name(sort), {sort: own[sort]}) for sort in sorts]
     else:
         bars = _with_rest(ordered)
-    rows: list[list[object]] = [["joints", *map(called, sorts), "bytes", "share"]]
+    rows: list[list[object]] = [["joints", *map(part_name, sorts), "bytes", "share"]]
     for name, own in ordered:
         size = sum(own.values())
         share = f"{100 * size / total:.1f} %"
@@ -81,7 +81,7 @@ def bytes_chart(clip: Clip) -> Chart:
     return Chart(title, (WIDTH, 110 + 24 * max(3, len(bars))), draw, (table,))
 
 
-def called(sort: Sort) -> str:
+def part_name(sort: Sort) -> str:
     return OTHER if sort is None else f"resolution {sort}"
 
 
@@ -93,7 +93,7 @@ def _draw_bars(
     ramp = _ramp(theme, sorts)
     for sort in sorts:
         sizes = np.array([own.get(sort, 0) for _, own in bars], float)
-        axes.barh(places, sizes, left=left, color=ramp[sort], label=called(sort), height=0.72)
+        axes.barh(places, sizes, left=left, color=ramp[sort], label=part_name(sort), height=0.72)
         left += sizes
     name_ticks(axes, places, [name for name, _ in bars], LONGEST)
     axes.margins(y=0.02)

@@ -92,13 +92,13 @@ def render(
     them. ``view`` "front", "side", "top" or "three-quarter" is relative to the first facing of the
     figure; ``theme`` "light" or "dark"; ``size`` (width, height) in pixels. A film has ``fps``
     pictures a second and plays ``speed`` times as fast as the motion was. ``follow``: the camera
-    follows; None: only where the figure would be small otherwise. ``rate`` in frames a second,
+    follows; None: only if the figure would be small otherwise. ``rate`` in frames a second,
     ``unit`` and ``up`` are for motions that state none; the result lists assumptions.
 
     Raises OptionError, also if a library is not installed, MotionError for a motion without points,
-    ExistsError where ``path`` exists and not ``force``.
+    ExistsError if ``path`` exists and ``force`` is not set.
     """
-    suffix = _kind(path, sheet)
+    suffix = _checked_suffix(path, sheet)
     look = Look(view, theme_of(theme), check_size(size), follow)
     notes: list[str] = []
     if has_no_lengths(moving.skeleton):
@@ -123,7 +123,7 @@ def render(
     return job.still(np.array([(first + stop - 1) // 2], np.int64))
 
 
-def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
+def _checked_suffix(path: str | os.PathLike[str], sheet: int | None) -> str:
     """The suffix of the picture, whose libraries are installed; raises OptionError."""
     suffix = Path(path).suffix.lower()
     if suffix not in (*FILMS, *STILLS):
@@ -215,7 +215,9 @@ class _Job:
             with film(stream, suffix[1:], width, height, fps) as taken:
                 for number, (frame, nodes) in enumerate(stage.track):
                     self.progress(number, len(frames), f"frame {frame}")
-                    words = label_texts(stage, width, height, self.moving.name, self._when(frame))
+                    words = label_texts(
+                        stage, width, height, self.moving.name, self._time_text(frame)
+                    )
                     canvas.draw(drawing_of(stage, number, nodes, words))
                     taken.add(canvas.pixels())
             size = stream.tell()
@@ -226,7 +228,7 @@ class _Job:
         stage = self._stage(frames, width, height, 1.0)
         canvas = Canvas(width, height, self.look.theme)
         ((frame, nodes),) = stage.track
-        words = label_texts(stage, width, height, self.moving.name, self._when(frame))
+        words = label_texts(stage, width, height, self.moving.name, self._time_text(frame))
         canvas.draw(drawing_of(stage, 0, nodes, words))
         return self._rendered(self._write_still(canvas), 1, width, height, None)
 
@@ -237,7 +239,7 @@ class _Job:
         stage = self._stage(frames, *layout.cell, rate=0.0, follow=True, port=port, around=0.6)
         canvas = Canvas(layout.width, layout.height, self.look.theme)
         title = f"{self.moving.name}"
-        canvas.draw(sheet_drawing(stage, layout, title, self._when))
+        canvas.draw(sheet_drawing(stage, layout, title, self._time_text))
         size = self._write_still(canvas)
         return self._rendered(size, len(frames), layout.width, layout.height, None)
 
@@ -259,7 +261,7 @@ class _Job:
         follow = self.look.follow if follow is None else follow
         return stage_of(track, self.look.theme, self.look.view, port, follow, rate, around)
 
-    def _when(self, frame: int) -> str:
+    def _time_text(self, frame: int) -> str:
         if self.timeline is None:
             return f"frame {frame}"
         return f"frame {frame}  {self.timeline.regular_times[frame]:.2f} s"

@@ -70,7 +70,7 @@ def stage_of(
     """Choose a view that shows all of a track; ``rate`` its frames a second.
 
     ``around`` is the margin of the floor, of the figure's size. With ``follow`` the camera follows,
-    with None only where the figure would be small otherwise.
+    with None only if the figure would be small otherwise.
     """
     axes = axes_of(view, track.forward)
     known = are_known(track.centers)

@@ -160,7 +160,7 @@ class Converted:
 def _state(path: Path, skeleton: object = None) -> object:
     """Stamp that changes with a file, a motion file below a folder, or the ASF of an AMC.
 
-    ``skeleton``: the named ASF, or None. Raises AccessError where there is no ``path``.
+    ``skeleton``: the named ASF, or None. Raises AccessError if there is no ``path``.
     """
     from mcz.files.editing.folders import files_below, motion_files
 

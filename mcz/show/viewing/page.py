@@ -249,7 +249,7 @@ def _too_large(name: str, most: int) -> LimitError:
 
 
 def _file(data: bytes, max_decoded: int | None) -> File:
-    """The file in ``data``, in salvage where it is damaged."""
+    """The file in ``data``, in salvage if it is damaged."""
     try:
         return mcz_open(data, max_decoded=max_decoded)
     except MczError:

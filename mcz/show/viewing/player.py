@@ -86,7 +86,7 @@ def _frame(moving: Moving, lines: Figure, drawing: PointSamples, rate: float) ->
 
 
 def _times(moving: Moving, drawing: PointSamples) -> list[float] | None:
-    """The times of the drawn frames to a millisecond, None where they are unknown."""
+    """The times of the drawn frames to a millisecond, None if they are unknown."""
     if moving.timeline is None:
         return None
     times = moving.timeline.times[:: drawing.every][: len(drawing.words)]

@@ -162,7 +162,7 @@ class ServerTasks:
         sides = [object_of(asked, key) for key in "ab"]
         ratios = []
         for side in sides:
-            with self._opened(side) as (file, clip):
+            with self._open_clip(side) as (file, clip):
                 ratios_of_clip = clip_ratios(file, clip)
                 ratios.append({key: ratios_of_clip[key] for key in RATIOS})
         one, other = map(self._motion, sides)
@@ -189,7 +189,7 @@ class ServerTasks:
             raise Refused(404, "no such file") from None
 
     @contextmanager
-    def _opened(self, asked: Params) -> Iterator[tuple[File, Clip]]:
+    def _open_clip(self, asked: Params) -> Iterator[tuple[File, Clip]]:
         clip_key = asked.get("clip")
         with mcz_open(self._file(asked).target(), salvage=self._registry.salvage) as file:
             if isinstance(clip_key, int) and not isinstance(clip_key, bool):
@@ -211,7 +211,7 @@ class ServerTasks:
         for cached_key, motion in self._cached:
             if cached_key == key:
                 return motion
-        with self._opened(asked) as (_, clip):
+        with self._open_clip(asked) as (_, clip):
             motion = clip.motion()
         motion = self._registry.with_facts(motion)
         if sum(signal.values.nbytes for signal in motion.signals) <= CACHED_BYTES:

@@ -39,7 +39,7 @@ def scale_of(quarters: int) -> int:
 
 
 def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
-    """A varint and the offset behind it; -1 where there is none."""
+    """A varint and the offset behind it; -1 if there is none."""
     value = shift = 0
     while at < end and shift < 56:
         byte = int(data[at])

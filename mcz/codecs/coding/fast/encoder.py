@@ -40,7 +40,7 @@ LEAST_GAIN = 60.0  # bits, before a parent is tried
 MOST_WEIGHT = 32000
 
 
-def see(residuals: Words2, lane: int, n_seen: int, seen: Floats2) -> None:
+def sample_residuals(residuals: Words2, lane: int, n_seen: int, seen: Floats2) -> None:
     """Fill a column of ``seen`` with residuals from the whole lane."""
     step = (residuals.shape[1] - 1) // n_seen
     for row in range(n_seen):
@@ -92,7 +92,7 @@ def weigh(both: float, square: float, total: float) -> tuple[float, float]:
     return min((2.0 * slope * both - slope * slope * square) / total, 0.999), weight
 
 
-def cross(own: Words, other: Words, weight: int, tried: Words) -> None:
+def subtract_parent(own: Words, other: Words, weight: int, tried: Words) -> None:
     """Fill ``tried`` with what a parent's residuals leave of a lane's own."""
     for row in range(1, len(own)):
         crossed = wrapped(128 + weight * int(other[row])) >> 8
@@ -182,7 +182,7 @@ def choose_parents(lanes: CodedLanes, plans: Ints2) -> None:
     for group in range(len(lanes.starts) - 1):
         for lane in range(lanes.starts[group], lanes.starts[group + 1]):
             groups[lane], parents[lane] = group, -1
-            see(residuals, lane, n_seen, seen)
+            sample_residuals(residuals, lane, n_seen, seen)
     gains = np.zeros((n_lanes, 2 * REACH + 1), np.float64)
     find_gains(residuals, seen, n_seen, gains)
     choose_roots(gains, groups, parents)
@@ -196,7 +196,7 @@ def choose_parents(lanes: CodedLanes, plans: Ints2) -> None:
         total = share_rows(seen, lane, n_seen, shares)
         add_products(seen, lane, parent, shares, sums[0], sums[1])
         _, weight = weigh(sums[0, 0], sums[1, 0], total)
-        cross(residuals[lane], residuals[parent], int(weight), tried)
+        subtract_parent(residuals[lane], residuals[parent], int(weight), tried)
         saved = costs[lane] - cost_of(tried, lanes.scales[lane], costs[lane])
         if saved * times > PARENT_COST:
             plans[numbers[lane], LINK], plans[numbers[lane], WEIGHT] = numbers[parent], int(weight)
@@ -289,7 +289,7 @@ class StreamBuilder:
         return result
 
     def _find_units(self, channels: Channels) -> tuple[dict[int, Ints], bytes]:
-        """Code channels in units where possible; returns rests, and the fields of all units."""
+        """Code channels in units if possible; returns rests, and the fields of all units."""
         plans = channels.plans
         tried = self._find_candidates(channels)
         rests: dict[int, Ints] = {}

@@ -100,20 +100,20 @@ class Streams:
         return _shift_words(words, bits & 7)
 
     def check(self, part: str) -> None:
-        """Raise FormatError where bits are left or missing."""
+        """Raise FormatError if bits are left or missing."""
         left = self.ends - self.bits
         rest = self.words(len(left)) & MASKS[np.clip(left, 0, 63)]
         if ((left < 0) | (left > 7) | (rest != 0)).any():  # FAST-20
             raise FormatError(f"fast: unused or missing bits in the {part}")
 
-    def longer(self, n_rows: int) -> Streams:
+    def with_more_rows(self, n_rows: int) -> Streams:
         """Streams of segments with more rows."""
         kept = self.rows > n_rows
         lanes = [own[kept[: len(own)]] for own in self.lanes]
         lanes = [own for own in lanes if len(own)]
         return Streams(self.data, self.bits[kept], self.ends[kept], self.rows[kept], lanes)
 
-    def ended(self, n_rows: int) -> Streams:
+    def with_rows(self, n_rows: int) -> Streams:
         """Streams of segments with this many rows."""
         own = self.rows == n_rows
         return Streams(self.data, self.bits[own], self.ends[own], self.rows[own], [])
@@ -165,8 +165,8 @@ def _read_leads(batch: Sequence[Lanes]) -> None:
     for row in range(residual.BEHIND + 1, len(leads)):
         # present values of lanes of these segments are not used
         if row - residual.BEHIND in lengths:
-            streams.ended(row - residual.BEHIND).check("residuals")
-            streams = streams.longer(row - residual.BEHIND)
+            streams.with_rows(row - residual.BEHIND).check("residuals")
+            streams = streams.with_more_rows(row - residual.BEHIND)
         for lanes in streams.lanes:
             residuals[lanes], scales[lanes] = _read_codes(streams, scales[lanes])
         if (streams.bits > streams.ends).any():

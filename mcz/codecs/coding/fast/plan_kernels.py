@@ -34,7 +34,7 @@ def code_bits(residual: int, k: int) -> int:
     return PLAIN + more + 1 + k + more
 
 
-def grown(scale: int, residual: int) -> int:
+def update_scale(scale: int, residual: int) -> int:
     return scale + ((16 * min(abs(residual), MOST_SIZE) - scale) >> 2)
 
 
@@ -67,7 +67,7 @@ def cost_of(residuals: Words, scale: int, most: int) -> int:
     while row < stop and left >= 0:
         residual = int(residuals[row])
         left += 1 - code_bits(residual, bit_length(scale >> 4))
-        scale = grown(scale, residual)
+        scale = update_scale(scale, residual)
         row += 1
     return most - left
 
@@ -232,7 +232,7 @@ def fill_weighted(n_steps: int, room: Floats2, normal: Floats2) -> None:
 
 
 def fit(column: Words, room: Floats2, normal: Floats2, taps: Floats) -> bool:
-    """Find the taps for rows from the middle; False where there are none."""
+    """Find the taps for rows from the middle; False if there are none."""
     n = min(len(column) - 1, FIT_ROWS)
     if n < FEWEST_STEPS:
         return False

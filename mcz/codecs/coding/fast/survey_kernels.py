@@ -75,7 +75,7 @@ def take_column(channels: Channels, n: int) -> int:
     return used
 
 
-def hashed(column: Ints) -> int:
+def hash_column(column: Ints) -> int:
     """A number that tells apart most columns that are not the same."""
     hash_value = 0
     for place in range(SEEN_ROWS):
@@ -84,7 +84,7 @@ def hashed(column: Ints) -> int:
     return hash_value
 
 
-def same(one: Ints, other: Ints) -> bool:
+def are_equal(one: Ints, other: Ints) -> bool:
     for row in range(len(one)):
         if one[row] != other[row]:
             return False
@@ -93,9 +93,9 @@ def same(one: Ints, other: Ints) -> bool:
 
 def find_source(columns: Ints2, n: int, table: Ints) -> int:
     """An earlier channel that has the same column, or -1; ``table`` has those that were there."""
-    slot = hashed(columns[n]) & len(table) - 1
+    slot = hash_column(columns[n]) & len(table) - 1
     while table[slot] >= 0:
-        if same(columns[table[slot]], columns[n]):
+        if are_equal(columns[table[slot]], columns[n]):
             return int(table[slot])
         slot = (slot + 1) & len(table) - 1
     table[slot] = n

@@ -6,7 +6,7 @@ SPEC.md, "Codec 1: fast", is normative. Imported on first use only.
 from __future__ import annotations
 
 from mcz.codecs.coding.fast import decode_kernels as head
-from mcz.codecs.coding.fast.plan_kernels import grown
+from mcz.codecs.coding.fast.plan_kernels import update_scale
 from mcz.codecs.coding.fast.residual_kernels import (
     BASE,
     DIGITS,
@@ -161,7 +161,7 @@ def put_tail(out: Bytes, bit: int, tail: int, lead: int, lattices: Ints2, lane: 
     """Write a tail as a column has it; returns the bit behind it."""
     rest_scale = lattices[lane, REST]
     if rest_scale >= 0:
-        lattices[lane, REST] = grown(rest_scale, tail)
+        lattices[lane, REST] = update_scale(rest_scale, tail)
         return put_code(out, bit, tail, rest_scale)
     if lattices[lane, TINY] and -1 <= lead <= 0:
         return put_tiny(out, bit, tail, lattices[lane])
@@ -184,7 +184,7 @@ def write_parts(
             if row:
                 residual = int(left[lane, row])
                 bit = put_code(residuals, bit, residual, scales[lane])
-                scales[lane] = grown(scales[lane], residual)
+                scales[lane] = update_scale(scales[lane], residual)
             tail, lead = columns[numbers[lane], row], int(leads[lane, row])
             tail_bit = put_tail(tails, tail_bit, tail, lead, lattices, lane)
     return (bit + 7) >> 3, (tail_bit + 7) >> 3

@@ -25,9 +25,9 @@ PRINTED = 1 << 62  # no ordinal: the decimal of such a product is to be printed
 def fill(
     codes: Ints, unit: float, shifts: int, tens: Floats, powers: Floats, digits: int, out: Ints
 ) -> int:
-    """Fill ``out`` with ordinals, ``PRINTED`` where one product is not exact enough: how many.
+    """Fill ``out`` with ordinals of ``digits``, ``PRINTED`` for an inexact product; count those.
 
-    Of so many ``digits``; ``tens``: the exact powers of ten; ``powers``: all of them.
+    ``tens``: the exact powers of ten; ``powers``: all of them.
     """
     power = left = 0  # power: of ten, of the number before
     for t in range(len(codes)):
@@ -59,7 +59,7 @@ def next_unit(
 ) -> tuple[int, int]:
     """The first unit from ``start`` on of which all values are multiples, as their ordinals show.
 
-    Where there is none: how many units there are. Also how many of the products show nothing, as
+    If there is none: how many units there are. Also how many of the products show nothing, as
     they are to be printed.
     """
     for place in range(start, len(units)):
@@ -72,7 +72,7 @@ def next_unit(
 def count_open(
     values: Floats, ordinals: Ints, unit: float, tens: Floats, powers: Floats, digits: int
 ) -> int:
-    """Count the multiples of a unit to be printed; -1 where another has another ordinal."""
+    """Count the multiples of a unit to be printed; -1 if another has another ordinal."""
     power = left = 0
     for row in range(len(values)):
         size = np.rint(abs(values[row]) / unit)
