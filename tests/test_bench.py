@@ -301,8 +301,9 @@ def test_tables_escape_and_leave_out() -> None:
 
 
 def test_a_clip_without_unit_has_length_units(samples: Path, tmp_path: Path) -> None:
+    mcz.write(mcz.read(samples / "walk.bvh")[:60], tmp_path / "walk.mcz")
     outcome = bench(
-        [str(samples / "walk.bvh")],
+        [str(tmp_path / "walk.mcz")],
         Runner(1, tasks.Cache(None)),
         codecs=["mrdwt:khan2016"],
         speeds=False,
@@ -314,10 +315,6 @@ def test_a_clip_without_unit_has_length_units(samples: Path, tmp_path: Path) -> 
         "mean_position_error",
     )
     assert any("length units" in table.caption for table in outcome.tables)
-    if report.can_draw():
-        assert [path.name for path in report.draw(outcome.clips, tmp_path)] == [
-            *("walk.png", "walk_mrdwt.png")
-        ]
 
 
 def test_a_clip_of_markers(samples: Path) -> None:

@@ -160,7 +160,7 @@ def decisions(tree: ast.AST) -> Iterator[ast.AST]:
 
 def branches(tree: ast.AST) -> list[int]:
     texts = {id(node): node.lineno for node in texts_of_errors(tree)}
-    within = (id(node) for test in decisions(tree) for node in ast.walk(test))
+    within = (id(node) for test in (decisions(tree) if texts else ()) for node in ast.walk(test))
     return sorted({texts[each] for each in within if each in texts})
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs import CODECS
 from mcz.codecs.contract import Model, model_id
+from tests.amounts import amount
 from tests.codecs.cases import CASES, small, write_smooth
 from tests.codecs.lossy import Direct
 from tests.repair import flip_bit, flips, join_parts, memory_below, parts_of, replace_payload, use
@@ -128,7 +129,7 @@ def test_files_with_repaired_checksums(name: str) -> None:
     for number, (chunk, payload) in enumerate(parts):
         if chunk.type not in (b"DATA", b"CLIP", b"MODL"):
             continue  # no codec has a say in them
-        bad = [flip_bit(payload, *at) for at in flips(len(payload), 60, seed=number)]
+        bad = [flip_bit(payload, *at) for at in flips(len(payload), amount(60, 25), seed=number)]
         bad += [payload[:size] for size in range(0, len(payload), max(1, len(payload) // 5))]
         for changed in bad:
             file_data = join_parts(replace_payload(parts, number, changed))

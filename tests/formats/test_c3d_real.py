@@ -19,6 +19,7 @@ import mcz
 from mcz import Motion
 from mcz.sources.c3d import c3d
 from mcz.sources.c3d.layout import parse_layout
+from tests.amounts import some
 from tests.formats.c3d_files import DEC, SGI, real_of
 
 DATA = Path(os.environ.get("MCZ_DATA", "no-data"))
@@ -226,7 +227,7 @@ def test_rotations_are_what_ezc3d_reads() -> None:
 
 def test_every_file_goes_through_an_mcz_file(tmp_path: Path) -> None:
     n = 0
-    for path in files():
+    for path in some(files(), 3):
         mcz.encode(path, tmp_path / "clip.mcz", codec="raw", force=True)
         with mcz.open(tmp_path / "clip.mcz") as file:
             (clip,) = file.clips.values()

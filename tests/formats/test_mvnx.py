@@ -251,17 +251,17 @@ def test_what_is_refused(old: bytes, new: bytes, words: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        (PELVIS, PELVIS + b' a="' + b"x" * 2**22 + b'"'),
-        (b"<comment>", b"<comment>" + b"&amp;" * 2**20),
-        (b"<comment>", b"<comment><!--" + b"<frames>" * 2**18 + b"-->"),
-        (b"<frames>", b"<frames>" + b" " * 2**22),
-        (b"<frames>", b"<frames>" + b"<frame>" * 2**18),
-        (b'type="normal"', b'type="normal"' + b" " * 2**22),
-        (b'type="normal"', b'type="normal" ' + b"a=" * 2**20),
-        (b"</orientation>", b"</orientation>" + b"<a>1</a>" * 2**16),
-        (b"</orientation>", b" 1" * 2**20 + b"</orientation>"),
-        (b"</orientation>", b"</orientation>" + b"<a>" * 2**18),
-        (b"<segments>", b"<segments>" + b"<segment/>" * 2**18),
+        (PELVIS, PELVIS + b' a="' + b"x" * 2**20 + b'"'),
+        (b"<comment>", b"<comment>" + b"&amp;" * 2**18),
+        (b"<comment>", b"<comment><!--" + b"<frames>" * 2**16 + b"-->"),
+        (b"<frames>", b"<frames>" + b" " * 2**20),
+        (b"<frames>", b"<frames>" + b"<frame>" * 2**16),
+        (b'type="normal"', b'type="normal"' + b" " * 2**20),
+        (b'type="normal"', b'type="normal" ' + b"a=" * 2**18),
+        (b"</orientation>", b"</orientation>" + b"<a>1</a>" * 2**14),
+        (b"</orientation>", b" 1" * 2**18 + b"</orientation>"),
+        (b"</orientation>", b"</orientation>" + b"<a>" * 2**16),
+        (b"<segments>", b"<segments>" + b"<segment/>" * 2**16),
     ],
 )
 def test_large_parts_take_little_time_and_memory(old: bytes, new: bytes) -> None:
@@ -271,7 +271,7 @@ def test_large_parts_take_little_time_and_memory(old: bytes, new: bytes) -> None
     back_or_refused(text)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 64 * len(text) + 2**26
+    assert peak < 64 * len(text) + 2**24
     assert time.perf_counter() - began < 30
 
 
