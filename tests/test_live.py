@@ -23,6 +23,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.container.chunks import (
+    CHECK_SIZE,
     END,
     Packet,
     build_chunk,
@@ -126,6 +127,15 @@ def test_any_number_of_frames(n: int, every: int, seed: int) -> None:
     )
     with mcz.open(data) as file:
         np.testing.assert_array_equal(file.clips["live"].read(), values)
+
+
+def test_each_frame_comes_with_its_last_byte() -> None:
+    values = frames()
+    data = live(values)
+    with mcz.open(data) as file:
+        ends = [row.stop + CHECK_SIZE for row in file.clips["live"].signals[0].rows]
+    stream = live_codec.Trickle(data)
+    assert [stream.at for _ in live_frames(stream)] == ends
 
 
 def test_one_write_a_frame() -> None:
