@@ -160,7 +160,7 @@ class SpaceFields(Record):
     step: float = field(Step, "quantizer step, 2^-100 to 2^100")
     weights: list[int] | None = field(
         If(this.flags & WEIGHTED, counted(Int8ul, 2**14)),
-        "of each channel the code of its weight; only where bit 1 of flags is set",
+        "code of the weight of each channel; only if bit 1 of flags is set",
     )
 
 

@@ -127,7 +127,7 @@ class IndexedSegment(Record):
     n_frames: int = field(UVARINT, "frames")
     lead: int = field(UVARINT, "as in DATA")
     tail: int = field(UVARINT, "as in DATA")
-    flags: int = field(UVARINT, "as in DATA; more where it is a packet: 64 of kind 1, 32 of kind 2")
+    flags: int = field(UVARINT, "as in DATA, plus 64 for a packet of kind 1, 32 for one of kind 2")
 
 
 class IndexedPlace(Record):
@@ -152,7 +152,7 @@ class Index(Record):
     clips: Table[IndexedClip] = field(columns(IndexedClip), "the clips")
     signals: Table[IndexedSignal] = field(columns(IndexedSignal), "the signals of all clips")
     segments: Table[IndexedSegment] = field(columns(IndexedSegment), "the segments of all clips")
-    n_behind: int = field(UVARINT, "first ancillary chunks, of the last clip of the INDX before")
+    n_behind: int = field(UVARINT, "first ancillary chunks, those of the last clip in previous")
     ancillary: Table[IndexedPlace] = field(
         columns(IndexedPlace), "the ancillary chunks of all clips"
     )

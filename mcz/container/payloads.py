@@ -69,11 +69,11 @@ class Channel(Record):
     )
     kind: int = field(Int8ul, "channel kind of the registry; 0: plain scalar")
     name: str | None = field(
-        If(this.flags & HAS_NAME, TEXT), "name; empty where absent: the kind says it", default=None
+        If(this.flags & HAS_NAME, TEXT), "name; empty if absent: the kind implies it", default=None
     )
     unit: str | None = field(
         If(this.flags & HAS_UNIT, TEXT),
-        "unit; empty where absent: kind and skeleton say it",
+        "unit; empty if absent: kind and skeleton imply it",
         default=None,
     )
     extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
@@ -95,17 +95,17 @@ class Joint(Record):
     )
     offset: Vector | None = field(
         If(this.flags & HAS_OFFSET, VECTOR),
-        "3 binary64, parent's origin to own; zero where absent",
+        "3 binary64, parent's origin to own; zero if absent",
         default=None,
     )
     axis: Vector | None = field(
         If(this.flags & HAS_AXIS, VECTOR),  # CONV-17
-        "3 binary64, Euler angles of the local axes; zero where absent",
+        "3 binary64, Euler angles of the local axes; zero if absent",
         default=None,
     )
     axis_order: int | None = field(
         If(this.flags & HAS_AXIS, one_of(Int8ul, range(6))),
-        "0 XYZ, 1 XZY, 2 YXZ, 3 YZX, 4 ZXY, 5 ZYX; XYZ where absent",
+        "0 XYZ, 1 XZY, 2 YXZ, 3 YZX, 4 ZXY, 5 ZYX; XYZ if absent",
         default=None,
     )
     tails: list[Vector] = field(
@@ -213,7 +213,7 @@ class ClipSource(Record):
     flags: int = field(flags(extended=True), "bit 7: has extension", default=0)
     template: bytes = field(ID, "id of the SRCE chunk")
     format: int = field(Int8ul, "source format id")
-    detail: bytes = field(SIZED, "what the template leaves open for this clip")
+    detail: bytes = field(SIZED, "detail of this clip, by its source format")
     path: str = field(TEXT, "relative path of the source file, with forward slashes")
     size: int = field(UVARINT, "bytes of the source file")
     extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
@@ -244,7 +244,7 @@ class Groups(Record):
     )
     sizes: list[int] | None = field(
         If(this.kind == GROUP_LISTED, counted(UVARINT)),
-        "channels of each group, in column order; only where kind is 3",
+        "channels of each group, in column order; only if kind is 3",
         default=None,
     )
 
@@ -265,7 +265,7 @@ class Signal(Record):
     role: int = field(Int8ul, "role of the registry; 0: none", default=0)
     of: int | None = field(
         If(this.role == RESIDUALS, UVARINT),
-        "index of the signal whose residuals these are; only where role is 3",
+        "index of the signal whose residuals these are; only if role is 3",
         default=None,
     )
     channels: list[Channel] | None = field(
@@ -345,7 +345,7 @@ class Clip(Record):
     rate_denominator: int = field(POSITIVE, "frame rate, denominator, at least 1")  # CLIP-14
     time_base: TimeBase | None = field(
         only_if(this.flags & HAS_TIME_BASE, TimeBase),
-        "numbers and time of the frames; only where flag bit 2 is set",
+        "numbers and time of the frames; only if flag bit 2 is set",
         default=None,
     )
     metadata: list[Metadata] = field(counted(Metadata), "pairs of key and value", default=[])
@@ -383,7 +383,7 @@ class MetaRecord(Record):
     """A record in the decoded data of META."""
 
     clip: str = field(TEXT, "name of the clip; empty: the whole file")
-    removed: list[str] = field(counted(TEXT), "keys that are not there any more")
+    removed: list[str] = field(counted(TEXT), "keys to remove")
     entries: list[Metadata] = field(counted(Metadata), "pairs of key and value")
 
 

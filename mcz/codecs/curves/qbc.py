@@ -86,7 +86,7 @@ class QbcHeader(Record):
         Checked(Int8ul, lambda value: value <= MAX_DECIMALS or value == SCALED),
         "decimals of control points, 0 to 15; 255: they are multiples of steps",
     )  # QBC-03
-    step: float | None = field(STEP, "2^-100 to 2^100, only where decimals is 255")
+    step: float | None = field(STEP, "2^-100 to 2^100, only if decimals is 255")
     position_step: float | None = field(STEP, "the same of the channels tx, ty, tz and length")
 
 

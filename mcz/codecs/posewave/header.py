@@ -111,7 +111,7 @@ class PosewaveHeader(Record):
         counted(UVARINT, 2**14), "numbers of the groups whose channels are exact, ascending"
     )
     contacts: list[ContactsFields] = field(
-        counted(ContactsFields, 1), "none, or what the contacts of segments rest on"
+        counted(ContactsFields, 1), "none, or the parameters of contacts"
     )
 
 

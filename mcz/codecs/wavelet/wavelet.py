@@ -55,7 +55,7 @@ class WaveletHeader(Record):
     )  # MRDWT-09
     unit: float | None = field(
         If(this.decimals == SCALED, bounded(Float64l, 2.0**-100, 2.0**100)),
-        "what step codes multiply, 2^-100 to 2^100, only where decimals is 255",
+        "factor of step codes, 2^-100 to 2^100, only if decimals is 255",
     )  # MRDWT-10
     least: int = field(
         bounded(UVARINT, 1, 2**39), "least magnitude of a detail that is not zero, 1 to 2^39"

@@ -178,7 +178,7 @@ class RecvPacket(Record):
     set: bytes = field(Exactly(16), "first 16 bytes of the SHA-256 of the stream")
     start: int = field(Int64ul, "offset in the file of the first byte that is protected")
     a_size: int = field(Int64ul, "bytes that are protected before the RECV")
-    t_size: int = field(Int64ul, "bytes that are protected behind the RECV")
+    t_size: int = field(Int64ul, "bytes that are protected after the RECV")
     block_size: int = field(Int32ul, "bytes of a block, a multiple of 8")
     n_recovery: int = field(Int32ul, "recovery blocks")
     index: int = field(Int32ul, "which section or recovery block this is, from 0")

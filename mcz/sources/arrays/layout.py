@@ -68,12 +68,12 @@ class ArrayRun(Record):
 class ArrayPiece(Record):
     """A piece of an array file."""
 
-    kind: int = field(one_of(Int8ul, tuple(Kind)), "what the piece is")  # ARRAY-01
+    kind: int = field(one_of(Int8ul, tuple(Kind)), "kind of the piece")  # ARRAY-01
     text: bytes | None = field(_if((Kind.TEXT,), SIZED), "TEXT only: the bytes")
     signal: int | None = field(
         _if(_OF_ROWS, UVARINT), "COUNT, DATA, ROWS and ITEMS only: index of the signal"
     )
-    after: bytes | None = field(_if((Kind.COUNT,), SIZED), "COUNT only: what follows the number")
+    after: bytes | None = field(_if((Kind.COUNT,), SIZED), "COUNT only: bytes after the number")
     size: int | None = field(
         _if((Kind.COUNT, *INTEGERS), UVARINT),
         "COUNT, ROWS and ITEMS only: bytes, those of blanks included",

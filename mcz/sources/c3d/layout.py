@@ -47,7 +47,7 @@ class C3dField(Record):
     """A field of the head of a C3D that differs by clip."""
 
     at: int = field(UVARINT, "offset in head, not before the end of the field before")
-    kind: int = field(one_of(Int8ul, tuple(Kind)), "what the field says")  # C3D-09
+    kind: int = field(one_of(Int8ul, tuple(Kind)), "content of the field")  # C3D-09
 
 
 class C3dTemplate(Record):
@@ -63,21 +63,21 @@ class C3dTemplate(Record):
     unsigned: int = field(
         bounded(Int8ul, 0, 1), "1: analog words are 0 to 65535; 0: they have a sign, or word is 4"
     )  # C3D-03
-    rotations: int = field(_WORD, "rotations; 0 where word is 2")
+    rotations: int = field(_WORD, "rotations; 0 if word is 2")
     ratio: int = field(_POSITIVE_WORD, "samples a frame of a rotation")  # C3D-06
     head: bytes = field(SIZED, "the file up to the data section, fields filled with zeros")
     fields: list[C3dField] = field(counted(C3dField), "the fields of head, in order")
     gap: bytes = field(
         SIZED, "bytes between the data section and the rotations; empty without rotations"
     )
-    tail: bytes = field(SIZED, "bytes behind the data")
+    tail: bytes = field(SIZED, "bytes after the data")
 
 
 class C3dOutputsTemplate(Record):
     """Template of C3D with model outputs."""
 
     outputs: list[int] = field(
-        counted(UVARINT), "points that are points, then outputs, and so on in turn"
+        counted(UVARINT), "runs of points, alternately no outputs and outputs"
     )
     file: C3dTemplate = field(C3dTemplate, "the file")
 
@@ -88,8 +88,8 @@ class C3dDetail(Record):
     n_frames: int = field(UVARINT, "frames of the source file")
     first: int = field(UVARINT, "number of its first frame")
     values: bytes = field(SIZED, "bytes of all fields, one after the other")
-    tail: bytes = field(SIZED, "more bytes behind the data")
-    zeros: int = field(UVARINT, "zero bytes behind all that")
+    tail: bytes = field(SIZED, "more bytes after the data")
+    zeros: int = field(UVARINT, "zero bytes after both tails")
 
 
 @dataclass(frozen=True, slots=True)

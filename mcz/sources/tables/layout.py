@@ -81,9 +81,9 @@ class ClockFields(Record):
     """Times that follow from frame numbers, in SECTION."""
 
     grid: Grid = field(GRID, "grid that prints the times, FIXED or TRIMMED")
-    numerator: int = field(UVARINT, "what a frame number counts")
-    denominator: int = field(_POSITIVE, "what that is divided by, at least 1")
-    offset: int = field(SVARINT, "what is added before")
+    numerator: int = field(UVARINT, "factor of the frame number")
+    denominator: int = field(_POSITIVE, "divisor of the sum, at least 1")
+    offset: int = field(SVARINT, "added to the product before division")
 
 
 class SectionFields(Record):
@@ -94,7 +94,7 @@ class SectionFields(Record):
     )
     header: bytes = field(SIZED, "text before the rows")
     marks: int = field(BIT, "1: control codes of the header are marks; 0: they are text")
-    missing: bytes = field(SIZED, "what stands where a value is invalid")
+    missing: bytes = field(SIZED, "text in place of an invalid value")
     clock: ClockFields | None = field(
         optional(ClockFields), "0 or 1: times that follow from the frame numbers"
     )
@@ -115,9 +115,7 @@ class TableTemplate(Record):
 class TableDetail(Record):
     """Detail of tables."""
 
-    details: list[Detail] = field(
-        counted(Detail, MAX_SECTIONS), "what each section leaves open, as many"
-    )
+    details: list[Detail] = field(counted(Detail, MAX_SECTIONS), "a detail for each section")
 
 
 @dataclass(frozen=True, slots=True)

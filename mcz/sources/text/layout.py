@@ -51,7 +51,7 @@ class RunFields(Record):
 
     gap: int = field(UVARINT, "number of the gap that precedes every token of the run")
     column: int = field(UVARINT, "first column: 0 the frame number, c + 1 channel c")
-    n_columns: int = field(UVARINT, "columns of the run, at least 1; 1 where column is 0")
+    n_columns: int = field(UVARINT, "columns of the run, at least 1; 1 if column is 0")
     width: int = field(
         _WIDTH, "padding: 0 none, 1 blank for no sign, w > 1 right, w < -1 left justified"
     )
@@ -82,7 +82,7 @@ class Detail(Record):
     """Detail of AMC and BVH, and of a section of a table."""
 
     count: bytes = field(SIZED, "frame count as printed; empty: the number of rows in decimal")
-    rows: int = field(UVARINT, "number of rows for which count holds; 0 where count is empty")
+    rows: int = field(UVARINT, "number of rows for which count holds; 0 if count is empty")
     gaps: list[bytes] = field(
         counted(SIZED, MAX_GAPS), "further gaps, numbered on from the template's"
     )
@@ -90,7 +90,7 @@ class Detail(Record):
         counted(PatternFields, MAX_PATTERNS), "further patterns, numbered on from the template's"
     )
     ends: int = field(BIT, "1: ending stands in place of the last row's tail; 0: the tail does")
-    ending: bytes = field(SIZED, "what follows the last token; empty where ends is 0")
+    ending: bytes = field(SIZED, "text after the last token; empty if ends is 0")
 
 
 @dataclass(frozen=True, slots=True)
