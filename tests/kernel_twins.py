@@ -27,7 +27,7 @@ from mcz import Channel, Joint, Motion, Signal, Skeleton, kernels
 from mcz.codecs import CODECS
 from mcz.codecs.coding.forms import BINARY32
 from mcz.codecs.coding.forms.counts import Law
-from mcz.codecs.coding.forms.products import DEGREE, of_products
+from mcz.codecs.coding.forms.units import DEGREE, of_products
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources.sample import bvh_walk
 from mcz.sources.text import bvh

@@ -144,9 +144,9 @@ def _loop(
     return True
 
 
-def build_model(bases: Sequence[Basis | Floats], shift: int = FINE) -> Model:
+def build_model(bases: Sequence[Basis | Floats]) -> Model:
     """``bases`` as a model; raises MotionError as ``build_bases``."""
-    return Model(BASES, build_bases(bases, shift))
+    return Model(BASES, build_bases(bases))
 
 
 @cache

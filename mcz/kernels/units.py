@@ -17,7 +17,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.coding.residuals",
     ),
     "numbers": (
-        "mcz.codecs.coding.forms.products",
+        "mcz.codecs.coding.forms.units",
         "mcz.model.numbers.decimal_kernels",
         "mcz.model.numbers.token_kernels",
         "mcz.model.numbers.value_kernels",

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mcz.codecs import codec_by_name
 from mcz.codecs.coding.fast import lanes
 from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
-from mcz.codecs.coding.forms import products
+from mcz.codecs.coding.forms import units
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless.best import AS_FAST, code_plan
 from mcz.codecs.lossless.echoes import choose_references
@@ -58,7 +58,7 @@ class Coder:
         found: list[object] = []
         for lacking in (False, True) if self.name == "fast" else (False,):
             with ExitStack() as stack:
-                for module in (products, lanes) if lacking else ():
+                for module in (units, lanes) if lacking else ():
                     name = f"{module.__name__}.lacks_compiled_kernels"
                     stack.enter_context(mock.patch(name, return_value=True))
                 found.append(self.decode_stream(stream, n_rows, n_channels, grid).tolist())

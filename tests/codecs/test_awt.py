@@ -30,7 +30,7 @@ def choose_coefficients(
     motion: Motion, average: float, **changes: Any
 ) -> tuple[choice.Choice, list]:
     source = source_of(motion)
-    bands = choice.coefficients_of("awt", source, transform_of(source.layout, "db2", 3))
+    bands = choice.coefficients_of(source, transform_of(source.layout, "db2", 3))
     given_ = {"whole_approximation": False, "iterations": None, "seed": 0} | changes
     weights = given_.pop("weights", np.ones(source.layout.n_channels))
     return choice.choose(bands, weights, average, **given_), bands

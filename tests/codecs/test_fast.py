@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs.coding.forms.counts import Law
-from mcz.codecs.coding.forms.products import DEGREE, of_products
-from mcz.codecs.coding.forms.units import of_multiples
+from mcz.codecs.coding.forms.units import DEGREE, of_multiples, of_products
 from mcz.container.caches import DecodedCache
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind

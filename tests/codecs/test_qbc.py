@@ -83,13 +83,11 @@ def curves_of(clip: Direct, group: int) -> list[tuple[int, int]]:
     for index, span in enumerate(clip.spans):
         frames = qbc.marks_of(span.first, span.stop, fields.coded_frames, fields.delta)
         own = len(frames) - (span.stop < fields.coded_frames)
-        marks = streams.parse_marks(clip.stream(index, 0, group), own, n_channels, "qbc")
+        marks = streams.parse_marks(clip.stream(index, 0, group), own, n_channels)
         if own < len(frames):
-            after = streams.parse_first_mark(clip.stream(index + 1, 0, group), n_channels, "qbc")
+            after = streams.parse_first_mark(clip.stream(index + 1, 0, group), n_channels)
             marks = np.concatenate([marks, after])
-        curves = streams.parse_curves(
-            clip.stream(index, 1, group), marks, frames, "qbc", whole=True
-        )
+        curves = streams.parse_curves(clip.stream(index, 1, group), marks, frames, whole=True)
         ends = int(frames[0]) + np.cumsum([0, *curves.lengths])
         found += [(int(a), int(b)) for a, b in zip(ends, ends[1:], strict=False)]
     return found

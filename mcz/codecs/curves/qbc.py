@@ -260,14 +260,14 @@ def _read_segment(
     column = 0
     for group in request.groups:
         n = len(layout.groups[group])
-        marks = parse_marks(fetch(index, 0, group), own, n, "qbc")
+        marks = parse_marks(fetch(index, 0, group), own, n)
         if own < len(frames):
             # DATA-09, QBC-11, QBC-12
-            behind = parse_first_mark(fetch(index + 1, 0, group), n, "qbc")
+            behind = parse_first_mark(fetch(index + 1, 0, group), n)
             marks = np.concatenate([marks, behind])
         fine = layout.n_resolutions - request.resolution > 1
         curves = (
-            parse_curves(fetch(index, 1, group), marks, frames, "qbc", whole=whole)
+            parse_curves(fetch(index, 1, group), marks, frames, whole=whole)
             if fine
             else straight_curves(marks, frames)
         )

@@ -56,32 +56,32 @@ def build_marks(points: Ints) -> bytes:
     return bytes((halves,)) + body
 
 
-def parse_marks(stream: bytes, count: int, n_channels: int, name: str) -> Ints:
+def parse_marks(stream: bytes, count: int, n_channels: int) -> Ints:
     """All ``count`` marks; raises FormatError on bad bytes."""
     points = np.zeros((count, n_channels), np.int64)
     if not stream:
         return points
-    halves = _scale(stream, 0, name)
+    halves = _scale(stream, 0)
     decode_stream(
         stream[1:],
         start_states("qbc")[MARKS],
         lambda state, data: kernels.code_marks(state, data, points, count, scale_of(halves)) < 0,
-        f"{name}: a mark",
+        "qbc: a mark",
         whole=True,  # QBC-15
     )
     return points
 
 
-def parse_first_mark(stream: bytes, n_channels: int, name: str) -> Ints:
+def parse_first_mark(stream: bytes, n_channels: int) -> Ints:
     """The first of some marks, (1, channels), which is coded without context."""
     points = np.zeros((1, n_channels), np.int64)
     if stream:
-        _scale(stream, 0, name)
+        _scale(stream, 0)
         decode_stream(
             stream[1:],
             bare_state(),
             lambda state, data: kernels.code_marks(state, data, points, 1, 1) < 0,
-            f"{name}: a mark",
+            "qbc: a mark",
             whole=False,
         )
     return points
@@ -124,11 +124,11 @@ def build_curves(marks: Ints, frames: Ints, curves: Curves) -> bytes:
     return bytes(halves.astype(np.uint8)) + body
 
 
-def parse_curves(stream: bytes, marks: Ints, frames: Ints, name: str, *, whole: bool) -> Curves:
+def parse_curves(stream: bytes, marks: Ints, frames: Ints, *, whole: bool) -> Curves:
     """The curves between marks; raises FormatError on bad bytes."""
     if not stream:
         return straight_curves(marks, frames)
-    scales = np.array([scale_of(_scale(stream, at, name)) for at in range(2)])
+    scales = np.array([scale_of(_scale(stream, at)) for at in range(2)])
     most = int(frames[-1] - frames[0])
     lengths = np.zeros(most, np.int64)
     ends = np.zeros((most, marks.shape[1]), np.int64)
@@ -140,12 +140,12 @@ def parse_curves(stream: bytes, marks: Ints, frames: Ints, name: str, *, whole: 
         return n_curves[0] >= 0
 
     # QBC-15
-    decode_stream(stream[2:], start_states("qbc")[DETAILS], loop, f"{name}: a curve", whole=whole)
+    decode_stream(stream[2:], start_states("qbc")[DETAILS], loop, "qbc: a curve", whole=whole)
     n = n_curves[0]
     return Curves(lengths[:n], ends[:n], mids[:n])
 
 
-def _scale(stream: bytes, at: int, name: str) -> int:
+def _scale(stream: bytes, at: int) -> int:
     if at >= len(stream) or stream[at] > MAX_SCALE:  # QBC-16, QBC-22
-        raise FormatError(f"{name}: a scale is missing at {at} of a stream of {len(stream)} bytes")
+        raise FormatError(f"qbc: a scale is missing at {at} of a stream of {len(stream)} bytes")
     return stream[at]

@@ -71,7 +71,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
     weights = _weights(source, chosen["distortion"])
     choice = choose(
-        coefficients_of("awt", source, transform),
+        coefficients_of(source, transform),
         weights,
         average,
         whole_approximation=not published,
@@ -162,9 +162,9 @@ class Choice:
     after: float
 
 
-def coefficients_of(name: str, source: SignalSource, transform: Transform) -> list[Floats]:
+def coefficients_of(source: SignalSource, transform: Transform) -> list[Floats]:
     """The bands of a whole clip, the coarsest first, (coefficients, channels)."""
-    frames = Frames(name, source, transform.wavelet, transform.levels)
+    frames = Frames("awt", source, transform.wavelet, transform.levels)
     unit, n_frames = 1 << transform.levels, source.layout.n_frames
     length = -(-BLOCK_FRAMES // unit) * unit
     parts = []

@@ -25,8 +25,7 @@ from mcz.codecs.coding.fast.plan_kernels import TRIED_ROWS, cost_of
 from mcz.codecs.coding.fast.survey_kernels import Channels, CodedLanes
 from mcz.codecs.coding.forms import BINARY32, form_of_grid, has_binary32, unit_grid
 from mcz.codecs.coding.forms.counts import may_be_counts
-from mcz.codecs.coding.forms.products import tiny_limit
-from mcz.codecs.coding.forms.units import find_units
+from mcz.codecs.coding.forms.units import find_units, tiny_limit
 from mcz.kernels import kernel, wrapped
 from mcz.kernels.types import Floats, Floats2, Ints, Ints2, Words, Words2
 from mcz.model.numbers import Grid, GridKind
