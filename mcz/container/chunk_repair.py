@@ -123,7 +123,7 @@ def _shift_copies(
     """Each copy, and the shift of its original from the stated offset.
 
     Bytes that were inserted or cut out before a COPY shift all of its offsets. Intact copied chunks
-    show the shift, also for the damaged ones between them; None where they do not agree.
+    show the shift, also for the damaged ones between them; None if they do not agree.
     """
     places: dict[tuple[bytes, int | None, bytes], list[int]] = {}
     for one in scanned.chunks:

@@ -216,9 +216,9 @@ def build_foot(index_offset: int, index_length: int) -> bytes:
 
 
 def parse_foot(data: bytes, offset: int) -> Foot | None:
-    """The FOOT whose 32 bytes are ``data``, or None where they are not one.
+    """The FOOT whose 32 bytes are ``data``, or None if they are not one.
 
-    Raises ChecksumError where the magic is right and the crc wrong, FormatError for a bad field.
+    Raises ChecksumError if the magic is right and the crc wrong, FormatError for a bad field.
     """
     if len(data) != FOOT.size or data[24:] != END_MAGIC:  # FOOT-03
         return None
@@ -300,7 +300,7 @@ def head_size(sequence: int, length: int) -> int:
 def parse_packet_head(data: bytes | bytearray, at: int, limit: int) -> tuple[int, int, int, int]:
     """The first byte of the packet at ``at``, its sequence, the start and the end of its body.
 
-    Its checksum is not checked. Raises TruncatedError where ``data`` ends in the head, FormatError
+    Its checksum is not checked. Raises TruncatedError if ``data`` ends in the head, FormatError
     for a bad head, LimitError for a body over ``limit``.
     """
     first = data[at]
@@ -321,7 +321,7 @@ def parse_packet_head(data: bytes | bytearray, at: int, limit: int) -> tuple[int
 
 
 def is_packet(data: bytes, packet: Packet) -> bool:
-    """True where ``data`` ends with such a packet, of any sequence number."""
+    """True if ``data`` ends with such a packet, of any sequence number."""
     length = len(packet.body)
     body_at = len(data) - CHECK_SIZE - length
     first, ending = _head(packet.kind, packet.fresh, 0, length)[:1], varint(length)

@@ -273,7 +273,7 @@ class ClipRow:
 class PackedClipRow(ClipRow):
     """A row of an index, whose ``segments`` stay packed until first use.
 
-    They raise FormatError where the index is wrong.
+    They raise FormatError if the index is wrong.
     """
 
     __slots__ = ("_pack", "_segments", "_unpack")

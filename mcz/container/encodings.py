@@ -230,7 +230,7 @@ def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
 def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
     """The copies in ``payload``, of the COPY ``chunk``; they decode to ``limit`` at most.
 
-    Raises FormatError where they are not in file order, or not before the COPY.
+    Raises FormatError if they are not in file order, or not before the COPY.
     """
     fields = parse(payloads.Copy, payload, chunk.label)
     check(f"chunk {chunk.label}: bytes of the copies", fields.size, limit)  # LIMIT-16

@@ -88,7 +88,7 @@ def check(what: str, value: int, limit: int) -> None:
 
 
 def check_decoded(what: str, value: int, limit: int) -> None:
-    """Raise LimitError where ``value`` bytes exceed the limit that the caller sets for a file."""
+    """Raise LimitError if ``value`` bytes exceed the limit that the caller sets for a file."""
     if value > limit:  # LIMIT-02
         raise LimitError(
             f"{what}: {value} bytes are over the limit of {limit} decoded bytes",

@@ -245,7 +245,7 @@ def build_head(profile: Profile) -> bytes:
 
 
 def parse_head(payload: bytes) -> Profile:
-    """The profile of the file; raises UnsupportedError where it needs a newer reader."""
+    """The profile of the file; raises UnsupportedError if it needs a newer reader."""
     head = parse(payloads.Head, payload, "HEAD")
     if head.profile not in PROFILES:
         raise UnsupportedError(f"HEAD: profile {head.profile} is unknown")  # CONV-16

@@ -75,7 +75,7 @@ TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a
 class Container:
     """An open file. ``unverified`` counts the segments of which only a part was read.
 
-    That happens only where ``reads_parts`` allows it. ``directory`` may come from the writer of a
+    That happens only if ``reads_parts`` allows it. ``directory`` may come from the writer of a
     file that is not finished.
     """
 
@@ -124,7 +124,7 @@ class Container:
     def _open(self) -> Directory:
         tail_size = min(self.source.size, self.source.tail)
         tail = self.source.read(self.source.size - tail_size, tail_size)
-        if not self.source.remote:  # where requests are slow, INDX's copy of HEAD suffices
+        if not self.source.remote:  # if requests are slow, INDX's copy of HEAD suffices
             check_signature(self.source)
         foot = self._read_foot(tail)
         if not foot.index_length:

@@ -269,7 +269,7 @@ class Salvager(Scanner):
 
 
 def _is_inside(event: Event) -> bool:
-    """True where more of the chunk follows in other events: of an open DATA."""
+    """True if more of the chunk follows in other events: of an open DATA."""
     if isinstance(event, ChunkEvent):
         return event.chunk.length is None
     return isinstance(event, PacketEvent) and event.packet.kind != END

@@ -164,7 +164,7 @@ def parse_segment_header(data: bytes) -> tuple[SegmentHeader, int]:
 def parse_stream_table(data: bytes, counts: StreamCounts) -> StreamTable:
     """The table at the start of ``data``, which may be cut after it.
 
-    Raises TruncatedError where ``data`` ends inside the table.
+    Raises TruncatedError if ``data`` ends inside the table.
     """
     header, at = parse_segment_header(data)
     n_streams = counts.total(header.flags)

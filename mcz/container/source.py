@@ -41,7 +41,7 @@ def lock(stream: BinaryIO) -> bool:
 def locked_file(path: Path) -> Iterator[BinaryIO]:
     """The file at ``path``, to read and write, which no other process appends to in the block.
 
-    Raises AccessError where one does, and where the file cannot be opened.
+    Raises AccessError if one does, and if the file cannot be opened.
     """
     try:
         stream = open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below

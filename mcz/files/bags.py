@@ -133,7 +133,7 @@ def check_bag(
 ) -> BagCheck:
     """Compare each file of a bag with each manifest; lists missing, extra and changed files.
 
-    Raises OptionError where the folder is not a bag, AccessError where a file cannot be read.
+    Raises OptionError if the folder is not a bag, AccessError if a file cannot be read.
     """
     check = BagCheck(Path(folder))
     if not is_bag(folder):
@@ -281,8 +281,8 @@ def bag(
     ``info``: lines of ``bag-info.txt``, such as {"Source-Organization": "..."}; Bagging-Date is
     today unless given, Bag-Software-Agent is ``software``. Every ``.mcz`` is checked quickly first.
     The folder gets its name when it is complete. Raises FormatError for a damaged ``.mcz``,
-    ExistsError where ``folder`` exists, OptionError for two files of one name and a name with % or
-    a line end, AccessError where a file cannot be read or written.
+    ExistsError if ``folder`` exists, OptionError for two files of one name and a name with % or
+    a line end, AccessError if a file cannot be read or written.
     """
     target, paths = Path(folder), [Path(file) for file in files]
     lines = _info_lines(dict(info or {}), software)

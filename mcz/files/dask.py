@@ -58,7 +58,7 @@ def verify(
     """Check an MCZ file as ``mcz.verify``, its clips on the workers of ``client``.
 
     ``target`` is a path or URL that all of them can read; ``client`` is as in ``pack``. Raises as
-    ``mcz.verify``, and WorkerError where machines are lost.
+    ``mcz.verify``, and WorkerError if machines are lost.
     """
     with connect(client) as used, use_engine(Cluster(used)):
         return faults.verify(target, max_decoded=max_decoded, where=where)
@@ -243,7 +243,7 @@ def pack(
     ``root`` and ``target`` are paths or URLs for fsspec ("s3://bucket/takes"); all machines can
     read ``root``, only this one writes ``target``. ``client`` is a ``distributed.Client``, the
     address of a scheduler, or None for the client of the process. The bytes equal those of
-    ``mcz.pack``. Raises OptionError, and WorkerError where the cluster has no workers; a file whose
+    ``mcz.pack``. Raises OptionError, and WorkerError if the cluster has no workers; a file whose
     machines are lost repeatedly is reported as failed.
     """
     root = os.fspath(root)
@@ -311,7 +311,7 @@ def is_url(root: str) -> bool:
 def list_files(root: str, target: Target) -> tuple[list[Entry], list[Outcome]]:
     """The files below ``root`` except an earlier ``target``, in the order of an archive.
 
-    Raises OptionError where it is not a folder, AccessError where it cannot be listed.
+    Raises OptionError if it is not a folder, AccessError if it cannot be listed.
     """
     if not is_url(root):
         folder = Path(root)

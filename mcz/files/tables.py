@@ -47,7 +47,7 @@ class Table:
     mask: NDArray[np.bool_]
     frame_numbers: NDArray[np.int64]
     frame_rate: Fraction | None
-    units: Sequence[str] = ()  # of the columns, "" where unknown; empty: those of the skeleton
+    units: Sequence[str] = ()  # of the columns, "" if unknown; empty: those of the skeleton
     motion: Motion | None = None  # the motion with exactly these channels
     times: NDArray[np.float64] | None = None
     samples_per_frame: int = 1

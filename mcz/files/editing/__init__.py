@@ -25,7 +25,7 @@ from mcz.model.text_format import fields_text
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Outcome for one file; ``message`` gives the reason where ``result`` alone does not.
+    """Outcome for one file; ``message`` gives the reason if ``result`` alone does not.
 
     ``result`` of a file that is added to an archive:
         "parsed", "skeleton", "verbatim", "present" (the target has it already),

@@ -76,7 +76,7 @@ def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
     Where intact clips, skeletons or attachments follow that FOOT, ``salvage`` keeps them and
     ``force`` drops them; otherwise a FormatError names them. If the end of the file is damaged, not
     just truncated, one of the two is required. If the block fails, the file is unchanged; if
-    writing fails, it ends at its old end, or at that FOOT. Raises AccessError where another process
+    writing fails, it ends at its old end, or at that FOOT. Raises AccessError if another process
     is appending to the file.
     """
     with locked_file(path) as stream:

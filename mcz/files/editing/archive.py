@@ -173,7 +173,7 @@ def append(
     is damaged, one of the two is required. ``arrays`` is as in ``mcz.read``, ``threads`` as in
     ``mcz.write``, and so is ``copies``, for all chunks without copies; None: if the file has some.
     ``jobs`` is as in ``mcz.pack``. Raises AccessError while another process is appending,
-    OptionError where the target is also a source.
+    OptionError if the target is also a source.
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     options = SourceOptions(
@@ -302,7 +302,7 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
     """The path of a file to append ``named`` to: a copy, if it must replace older contents.
 
     The copy lacks these, and takes the place of ``target`` when the block succeeds. Metadata of a
-    replaced clip are set for the new one. Raises OptionError where an alias has the same content.
+    replaced clip are set for the new one. Raises OptionError if an alias has the same content.
     """
     old: list[str] = []
     if named:

@@ -120,10 +120,10 @@ def extract(
     keep only this clip, or these; otherwise all are cut, and attachments kept. ``where``: keep only
     the clips that match it, see ``File.find``. ``salvage``: damage outside of the kept parts is
     allowed. ``max_decoded``: as in ``mcz.open``; the result is decoded once to hash it. ``copies``:
-    as in ``mcz.write``; None: where ``source`` has some. ``recode``: encode a clip again where
-    copying is impossible: where joints share a group with others, which is refused by default, or
-    where frames outside of the cut are needed to decode it. Raises OptionError or MotionError for
-    what cannot be cut, and where the target is the source; FormatError for bad bytes; nothing is
+    as in ``mcz.write``; None: if ``source`` has some. ``recode``: encode a clip again if
+    copying is impossible: if joints share a group with others, which is refused by default, or
+    if frames outside of the cut are needed to decode it. Raises OptionError or MotionError for
+    what cannot be cut, and if the target is the source; FormatError for bad bytes; nothing is
     left under the target's name then.
     """
     alone = clip is not None or where is not None

@@ -142,7 +142,7 @@ class Folder:
     def place(self, path: str, *, force: bool) -> Path:
         """Return the place of the file ``path``, with the folders above it created.
 
-        Raises AccessError where a link, or something other than a file or folder, is in the way,
+        Raises AccessError if a link, or something other than a file or folder, is in the way,
         and ExistsError for an existing file, which with ``force`` is one that was just written: the
         disk does not distinguish the two names.
         """

@@ -130,7 +130,7 @@ def set_rate(
 
     ``names`` and ``where`` select clips, by default all with an unknown rate. The rate is in CLIP,
     so the file is rewritten, see ``delete_clips`` for ``output``; the values are unchanged. Raises
-    OptionError where the source of a clip states the rate, and for a change of a rate, unless
+    OptionError if the source of a clip states the rate, and for a change of a rate, unless
     ``force``.
     """
     exact = frame_rate_of(rate, "rate").limit_denominator(10**6)

@@ -316,7 +316,7 @@ def _bytes_after(source: ByteSource, last: Examined) -> int:
 def check_recovery(target: Target) -> Recovery | None:
     """Check a file by its recovery data; None for a file without any.
 
-    Raises AccessError where it cannot be read.
+    Raises AccessError if it cannot be read.
     """
     with closing(open_bytes(target)) as source:
         recovery, sets = examine(source)
@@ -374,8 +374,8 @@ def protect(
     wherever they lie: single bytes, a burst, the beginning, the end. If the file has recovery data
     already, only bytes appended since get new data; without such bytes nothing changes. ``anew``
     rewrites the file and computes recovery data for all of it. Returns all recovery data, in the
-    order of the file. Raises OptionError for a ``redundancy`` out of range, FormatError where
-    rewriting would lose a chunk of unknown type, AccessError where another process is appending,
+    order of the file. Raises OptionError for a ``redundancy`` out of range, FormatError if
+    rewriting would lose a chunk of unknown type, AccessError if another process is appending,
     and as ``mcz.append`` for a file cut short.
     """
     check_redundancy(redundancy)

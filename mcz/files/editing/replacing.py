@@ -88,7 +88,7 @@ def replace(
     """Replace the values of one joint of a clip; write the file to ``target``, by default in place.
 
     ``source`` is as in ``mcz.open``, or an open File, which does not change and needs a ``target``.
-    ``clip`` may be None where there is only one. ``values``, of shape (n_frames, channels of the
+    ``clip`` may be None if there is only one. ``values``, of shape (n_frames, channels of the
     joint), are in source units; a clip without a source file takes NaN for invalid. The joint is
     encoded with the clip's own codec and settings, all other streams are copied byte for byte. A
     lossless clip stores every number exactly, or, ``on_grid``, the nearest that its source would
@@ -96,7 +96,7 @@ def replace(
     codec codes all joints together is decoded and encoded again, so that other joints change a
     little too; by default it is refused.
 
-    Raises OptionError where the codec cannot encode a joint alone, or where ``target`` is the
+    Raises OptionError if the codec cannot encode a joint alone, or if ``target`` is the
     source, MotionError for values that it cannot store; the file is unchanged then.
     """
     with ExitStack() as stack:

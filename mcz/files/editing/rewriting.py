@@ -390,7 +390,7 @@ def rewriting(
 ) -> Iterator[Rewriting]:
     """Open a file to rewrite; if it is rewritten in place, it is locked against appending.
 
-    Raises AccessError where another process is appending to it.
+    Raises AccessError if another process is appending to it.
     """
     with ExitStack() as stack:
         if output is None:

@@ -221,7 +221,7 @@ def _resolve(file: File, one: StoredFile) -> Item:
 
 
 def _restore(shared: tuple[File, object], one: StoredFile) -> bytes:
-    """The bytes of a file; raises FormatError where they cannot be restored."""
+    """The bytes of a file; raises FormatError if they cannot be restored."""
     file, _ = shared
     kind, name = _resolve(file, one)
     if kind == SKELETON:

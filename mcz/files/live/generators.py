@@ -44,7 +44,7 @@ def live_frames(stream: BinaryIO) -> Iterator[Frame]:
     Yields the number of the frame in its clip, from 0, its values and their validity, both
     (n_channels,) of the motion signal, the values NaN where invalid. A clip whose codec does not
     decode frame by frame comes when it has ended. Raises FormatError at the first fault, after all
-    frames before it: TruncatedError where the stream ends too early, ChecksumError where the frames
+    frames before it: TruncatedError if the stream ends too early, ChecksumError if the frames
     of a clip differ from its hash. ``stream_decode`` can continue instead.
     """
     if not hasattr(stream, "read"):
@@ -155,8 +155,8 @@ def stream_decode(
     number is known. ``post_filter``: positions go through the post filter, with a delay of 12
     frames; ``rate`` is the frame rate of a clip that states none.
 
-    With ``lost`` other than ``refuse``, FormatError is raised where a clip cannot be read at all,
-    and ChecksumError where all of its frames came and differ from its hash.
+    With ``lost`` other than ``refuse``, FormatError is raised if a clip cannot be read at all,
+    and ChecksumError if all of its frames came and differ from its hash.
     """
     if lost not in LOST:
         raise OptionError(f"lost is {lost!r}; it must be one of {', '.join(LOST)}")

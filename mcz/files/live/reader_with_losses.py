@@ -65,7 +65,7 @@ class FramesWithLosses:
         return self._stream.size
 
     def frames(self) -> Iterator[LiveFrame]:
-        """All frames with a known place; raises FormatError where reading cannot continue."""
+        """All frames with a known place; raises FormatError if reading cannot continue."""
         is_cut, cuts = True, list[Fault]()  # not faults if nothing follows
         for event in self._stream.events(self._parser):
             if isinstance(event, Fault) and isinstance(event.error, TruncatedError):

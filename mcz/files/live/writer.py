@@ -56,7 +56,7 @@ class LiveTraffic:
     ``total`` bytes were sent, ``frames`` of them with frames, ``coded`` of these as streams of the
     codec: the others are their framing, masks and repeated clip headers. ``asked`` is the last
     target bit rate of the codec, in kbit/s, None without one; ``seconds`` is the duration of the
-    frames, None where the frame rate is unknown.
+    frames, None if the frame rate is unknown.
     """
 
     total: int = 0
@@ -69,7 +69,7 @@ class LiveTraffic:
 
     @property
     def is_held(self) -> bool:
-        """False where frames take more than the target, and no coarser step would help."""
+        """False if frames take more than the target, and no coarser step would help."""
         if self.asked is None or not self.seconds:
             return True
         return self.frames / 125 / self.seconds <= MOST_OVER * self.asked
@@ -91,7 +91,7 @@ class LiveWriter:
     or were last, where a reader can join that has those of the beginning or finds them repeated
     there; None if there is none.
 
-    As a context manager it closes the clip, also where an interrupt (Ctrl-C) ends the block, as a
+    As a context manager it closes the clip, also if an interrupt (Ctrl-C) ends the block, as a
     recording is ended. Any other exception aborts it: the file stops without CEND and FOOT, and a
     reader raises TruncatedError after the last frame. An interrupt during a frame waits until that
     is written; a second one truncates the clip.
@@ -280,7 +280,7 @@ class LiveWriter:
         self._has_data, self._was_masked = True, False
 
     def _repeats(self) -> bool:
-        """True where the fresh frame that is due follows repeated headers."""
+        """True if the fresh frame that is due follows repeated headers."""
         asked = self.traffic.asked
         if self._repeat is not None:
             return self._repeat > 0 and (self._n_fresh - 1) % self._repeat == 0
@@ -385,7 +385,7 @@ class _Outlet:
 def defer_sigint() -> Iterator[None]:
     """Delay an interrupt (Ctrl-C) to the end of the block; a second one does not wait.
 
-    Only the main thread is ever interrupted, and only where Python handles the signal.
+    Only the main thread is ever interrupted, and only if Python handles the signal.
     """
     handler = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(handler):

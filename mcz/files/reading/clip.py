@@ -274,7 +274,7 @@ class Clip(StoredClip):
 
     @cached_property
     def timeline(self) -> Timeline | None:
-        """The times of all frames, None where neither times nor a rate are known."""
+        """The times of all frames, None if neither times nor a rate are known."""
         counting = Counting(self.frame_numbers, self.frame_rate)
         return timeline_of(counting, self.first_time, self.times_column())
 
@@ -287,7 +287,7 @@ class Clip(StoredClip):
         return known_timeline(self.name, self.timeline).times
 
     def timeline_at(self, rate: Fraction | None) -> Timeline | None:
-        """``timeline``, by ``rate`` where the clip states neither a rate nor times."""
+        """``timeline``, by ``rate`` if the clip states neither a rate nor times."""
         if self.timeline is None and rate is not None:
             return timeline_of(Counting(self.frame_numbers, rate), self.first_time)
         return self.timeline
@@ -363,7 +363,7 @@ class Clip(StoredClip):
         """The source file, byte for byte (of a lossy clip: like it), or a part of it.
 
         The arguments are those of ``motion``. A changed file states the frame rate of the clip, if
-        its format can. Raises ChecksumError where a lossless clip does not restore its file.
+        its format can. Raises ChecksumError if a lossless clip does not restore its file.
         """
         if (info := self.source) is None:
             raise OptionError("the clip has no source file", clip=self.name, hint=Hint.CONVERT)

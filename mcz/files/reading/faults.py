@@ -65,8 +65,8 @@ def check_checksums(source: ByteSource, progress: Report | None = None) -> Check
     """Check each checksum of ``source``, and compare INDX and FOOT with the chunks.
 
     Nothing is decoded: only a full check finds faults within sound checksums. ``progress`` is
-    called with the number of bytes done and the size of the file. Raises UnsupportedError where the
-    file needs a newer reader, AccessError where it cannot be read.
+    called with the number of bytes done and the size of the file. Raises UnsupportedError if the
+    file needs a newer reader, AccessError if it cannot be read.
     """
     check = _Check(source)
     for event in events(source, check.parser):
@@ -257,8 +257,8 @@ def quick_check(
     """Check every checksum of a file and its index; returns the report and the faults.
 
     While another process appends to the file, this is of the file up to its last end. ``progress``
-    is called with the number of bytes done and the size of the file. Raises UnsupportedError where
-    it needs a newer reader, AccessError where it cannot be read.
+    is called with the number of bytes done and the size of the file. Raises UnsupportedError if
+    it needs a newer reader, AccessError if it cannot be read.
     """
     with ExitStack() as stack:
         source = stack.enter_context(closing(open_bytes(target)))
@@ -306,7 +306,7 @@ def verify(
 ) -> list[Problem]:
     """Check every checksum of a file, decode everything, restore every source.
 
-    Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
+    Returns the faults, none for a sound file; raises FormatError if it cannot even be opened.
     ``max_decoded`` and ``threads`` are as in ``mcz.open``. ``where``: check every checksum, but
     decode and restore only the clips that match it, see ``File.find``; OptionError for none.
     ``quick``: check only the checksums and the index, at the speed of the disk; it also reports all

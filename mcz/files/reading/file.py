@@ -255,7 +255,7 @@ class File:
     def chosen(self, names: Iterable[str] | None = None, where: Where | None = None) -> list[Clip]:
         """The clips of these names that match ``where``; None: all.
 
-        Raises OptionError as ``only_clip`` and ``find``, and where no clip matches.
+        Raises OptionError as ``only_clip`` and ``find``, and if no clip matches.
         """
         clips = list(self) if names is None else self.clips_called(names)
         if where is None:
@@ -297,7 +297,7 @@ def open(
     ``threads`` decode in parallel, by default one a processor; the numbers are the same. ``verify``
     compares the SHA-256 of every signal that is decoded whole. By default it is not compared for
     the codecs raw and fast, whose bytes have checksums. Raises FormatError, in particular
-    TruncatedError where there is no FOOT at the end, AccessError where the file cannot be read, and
+    TruncatedError if there is no FOOT at the end, AccessError if the file cannot be read, and
     OptionError.
     """
     options = {

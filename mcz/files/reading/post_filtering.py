@@ -35,7 +35,7 @@ def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
     where they are nearly exact. Unknown positions stay unknown. The other signals are kept; there
     is no source. ``rate`` replaces the frame rate of the motion.
 
-    Raises MotionError for a motion that is not of markers alone, OptionError where the length unit
+    Raises MotionError for a motion that is not of markers alone, OptionError if the length unit
     or the frame rate is unknown.
     """
     motion = SourceOptions(rate=rate).applied_to(motion)
@@ -148,7 +148,7 @@ def _check_markers(name: str, skeleton: Skeleton, has_channels: bool) -> None:
 def _settings(
     name: str, skeleton: Skeleton, rate: Fraction | None, per_frame: int
 ) -> tuple[float, float]:
-    """Rows a second, and the length unit in cm; raises OptionError where either is unknown."""
+    """Rows a second, and the length unit in cm; raises OptionError if either is unknown."""
     if rate is None:  # FILT-03
         raise OptionError(
             "its frame rate is unknown, but the post filter needs it: its cutoffs are in Hz",

@@ -116,7 +116,7 @@ def read_motion(
     """Read the motion file ``path``, whose bytes are ``data`` if already read.
 
     ``given`` is the skeleton of a format that needs one: an object, the path of a file, "none" for
-    none, or None to search. The metadata state how one was found. Raises SourceError where no
+    none, or None to search. The metadata state how one was found. Raises SourceError if no
     skeleton can be chosen, and as ``read_source``; with ``flat`` a file with several possible
     skeletons nearby is read without one, and the metadata mention it.
     """
@@ -141,7 +141,7 @@ def read_motion(
 
 
 def with_note(motion: Motion, how: str) -> Motion:
-    """``motion`` with metadata on ``how`` its skeleton was found, "" where it was given."""
+    """``motion`` with metadata on ``how`` its skeleton was found, "" if it was given."""
     if not how:
         return motion
     notes = "; ".join(filter(None, (how, motion.metadata.get(NOTE, ""))))

@@ -122,7 +122,7 @@ def clip_ratios(file: File, clip: Clip) -> dict[str, float | None]:
 
 
 def ratios_of(file: File, clip: Clip, sizes: Sizes) -> dict[str, float | None]:
-    """The compression ratios of SPEC.md's registry; None where the numerator is unknown."""
+    """The compression ratios of SPEC.md's registry; None if the numerator is unknown."""
     coded = sizes.payload + sizes.overhead + sizes.models
     try:
         lossless = all(signal.codec.lossless for signal in clip.signals)

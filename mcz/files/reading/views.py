@@ -92,7 +92,7 @@ def _span(rows: Rows) -> tuple[int, int]:
 class Preview:
     """Some frames of a clip, ascending and counted from 0; a row of values for each.
 
-    ``mask`` is None where all values are valid. ``step``: the frames between two of them; only the
+    ``mask`` is None if all values are valid. ``step``: the frames between two of them; only the
     last may be nearer.
     """
 
@@ -103,7 +103,7 @@ class Preview:
 
     @property
     def is_regular(self) -> bool:
-        """True where every frame is ``step`` after the one before."""
+        """True if every frame is ``step`` after the one before."""
         return bool((np.diff(self.frames) == self.step).all())
 
     def masked(self) -> Values:

@@ -53,8 +53,8 @@ def replacing(target: Target, *, force: bool, inputs: Iterable[object] = ()) -> 
     """A binary stream whose bytes become ``target`` only when the block succeeds.
 
     On disk that is a temporary file next to the target, synced and renamed; a device or a pipe, and
-    a given stream, are written directly. Raises OptionError where the target is one of ``inputs``,
-    even with ``force``, ExistsError where it exists and not ``force``, AccessError where it cannot
+    a given stream, are written directly. Raises OptionError if the target is one of ``inputs``,
+    even with ``force``, ExistsError if it exists and not ``force``, AccessError if it cannot
     be written.
     """
     refuse_inputs(target, inputs)
@@ -231,7 +231,7 @@ def _sync_directory(path: Path) -> None:
 
 
 def refuse_inputs(target: object, inputs: Iterable[object]) -> None:
-    """Raise OptionError where ``target`` is one of ``inputs``, by its file and not by its name.
+    """Raise OptionError if ``target`` is one of ``inputs``, by its file and not by its name.
 
     Each is a path, an fsspec target, a stream or anything else, which is not a file. Links of both
     sorts lead to the same file; a device, a pipe or a missing file is never an input.

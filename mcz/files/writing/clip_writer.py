@@ -374,7 +374,7 @@ def quality_entries(
 
 
 def figures(original: Motion, decoded: Motion) -> JsonObject:
-    """The figures of a record by their metric ids, rounded; None where there is none."""
+    """The figures of a record by their metric ids, rounded; None if there is none."""
     contacts = bool(find_feet(original.skeleton))
     entries = compare(original, decoded, contacts=contacts).entries()
     # Ten significant digits are more than measures agree on, in fewer bytes.

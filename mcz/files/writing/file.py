@@ -289,7 +289,7 @@ def write(
     more, or "small", for embedded readers. ``copies``: chunks that the clip depends on, such as
     skeleton and template, are stored a second time, so that a flipped bit there costs no frame
     (``mcz.open`` with ``salvage``). ``threads`` encode in parallel, by default one a processor; the
-    bytes are the same. Raises OptionError, MotionError, or LimitError where the profile is too
+    bytes are the same. Raises OptionError, MotionError, or LimitError if the profile is too
     small; MotionError also for a key of the metadata that SPEC.md does not register, unless it is
     private (``x-...``).
     """
@@ -373,7 +373,7 @@ def to_npz(motion: Motion, target: Target, *, force: bool = False) -> None:
     """Write channels, skeleton, rotations and positions of ``motion`` as an NPZ without pickles.
 
     docs/guides/tables.md lists the arrays; "about" in the file describes their relations.
-    ``target`` is a path, an fsspec target or a binary stream. Raises ExistsError where it exists
+    ``target`` is a path, an fsspec target or a binary stream. Raises ExistsError if it exists
     and not ``force``, and AccessError.
     """
     data = npz_of(table_of(motion))

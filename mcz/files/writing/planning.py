@@ -59,8 +59,8 @@ def prepare(
 ) -> Prepared:
     """``motion``, or the positions of its points if ``codec`` codes those.
 
-    ``skeletons`` are those of ``Prepared``, of the given motion. Raises OptionError where positions
-    have no meaning, MotionError where there are none.
+    ``skeletons`` are those of ``Prepared``, of the given motion. Raises OptionError if positions
+    have no meaning, MotionError if there are none.
     """
     options = codec.options(split_bounds(params)[0])
     skeletons = skeletons or (StoredSkeleton(motion.skeleton),)
@@ -120,7 +120,7 @@ def with_true_sources(motion: Motion, *, lossless: bool) -> Motion:
     """``motion`` whose sources state the size and the hash of the file that they restore.
 
     Values may have been replaced since they were read: then the source has no original file. A
-    skeleton that differs from its own file has none. Raises MotionError or FormatError where the
+    skeleton that differs from its own file has none. Raises MotionError or FormatError if the
     source cannot hold the values.
     """
     motion = replace(motion, skeleton=_with_true_source(motion.skeleton)).counted_by_ones()

@@ -150,7 +150,7 @@ def _freed(signal: Signal, channels: Sequence[int]) -> Signal:
 def as_stored(motion: Motion) -> Motion:
     """``motion`` with the stored numbers of a file, which its source scales.
 
-    Without such a source, the values are stored unchanged, in their units. Raises MotionError where
+    Without such a source, the values are stored unchanged, in their units. Raises MotionError if
     the source contradicts a signal.
     """
     if all(signal.scaling is None for signal in motion.signals):

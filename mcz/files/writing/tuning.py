@@ -62,7 +62,7 @@ Bracket = tuple[Point, Point, bool]  # one that meets the target, one that misse
 def tuned_plan(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> ClipPlan:
     """The plan of a clip that meets the size or the error among ``params``.
 
-    Raises OptionError where a target cannot be met or has no meaning for this clip, and as
+    Raises OptionError if a target cannot be met or has no meaning for this clip, and as
     ``plan_clip``.
     """
     asked, bounds = split_bounds(params)
@@ -202,7 +202,7 @@ def search(
     """The setting nearest to the target, of those tried, without exceeding it.
 
     Returns the setting, its figure, and whether the range of the dial ended before the target.
-    Raises OptionError where no setting meets it. A figure such as a greatest error may jump up and
+    Raises OptionError if no setting meets it. A figure such as a greatest error may jump up and
     down.
     """
     tried: list[Point] = []
