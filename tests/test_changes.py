@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Motion
-from mcz.kinematics import positions_of
 from mcz.kinematics.metrics import comparison
+from mcz.kinematics.points import positions_of
 from mcz.sources.sample import bvh_walk
 from tests.motions import motions
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.exchange.conversion import converted_files
-from mcz.kinematics import point_names, positions, reach
+from mcz.kinematics.points import point_names, positions, reach
 from mcz.kinematics.rotations import ORDERS, euler_angles, euler_order
 from mcz.sources import FORMATS
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk

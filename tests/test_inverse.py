@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, MotionError, OptionError, Signal, Skeleton
-from mcz.kinematics import points_and_markers_of, positions_of, reach
 from mcz.kinematics.inverse import solve_ik
-from mcz.kinematics.points import virtual_marker_names
+from mcz.kinematics.points import points_and_markers_of, positions_of, reach, virtual_marker_names
 from mcz.kinematics.targets import Targets, unsolved_channels
 from mcz.sources.sample import acclaim_walk, bvh_walk
 from tests.skeletons import skeletons, values_for

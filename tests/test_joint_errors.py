@@ -11,8 +11,8 @@ import pytest
 
 import mcz
 from mcz import MotionError
-from mcz.kinematics import origins_of
 from mcz.kinematics.metrics.diff_document import joint_errors
+from mcz.kinematics.points import origins_of
 from tests.commands import run
 
 

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Joint, MotionError, OptionError, Signal, Skeleton
 from mcz.codecs.channel_weights import sensitivities
-from mcz.kinematics import (
-    chain,
+from mcz.kinematics import chain
+from mcz.kinematics.frames import FramePositions
+from mcz.kinematics.points import (
     depths,
     point_names,
     point_set,
@@ -23,7 +24,6 @@ from mcz.kinematics import (
     reach,
     virtual_markers_of,
 )
-from mcz.kinematics.frames import FramePositions
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import reference_points, skeletons, values_for
 

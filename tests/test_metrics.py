@@ -452,7 +452,7 @@ def test_rounding_as_khan_does(data: Path) -> None:
 @pytest.mark.parametrize("virtual_markers", [False, True])
 def test_positions_against_what_they_were_made_of(virtual_markers: bool) -> None:
     """Points with points and virtual markers with virtual markers, by places that are known."""
-    from mcz.kinematics import points_and_markers_of
+    from mcz.kinematics.points import points_and_markers_of
     from mcz.sources.sample import acclaim_walk
 
     walk = acclaim_walk()

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Signal, Skeleton
-from mcz.kinematics import origins_of, points_of, reach
 from mcz.kinematics.joint_names import counterparts
+from mcz.kinematics.points import origins_of, points_of, reach
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth, write_bytes
 from tests.skeletons import joints as random_joints

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
-from mcz.kinematics import positions_of
 from mcz.kinematics.chain import Chain
+from mcz.kinematics.points import positions_of
 from mcz.kinematics.poses.conversions import FORMS, continuous_signs, from_matrices, to_matrices
 from tests.motions import smooth
 from tests.skeletons import skeletons, values_for

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Motion, Skeleton
 from mcz.files.reading.stored_clip import with_indices, with_names
-from mcz.kinematics import point_names
+from mcz.kinematics.points import point_names
 from mcz.sources import sample
 from tests.commands import run
 from tests.motions import smooth

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
-from mcz.kinematics import origins_of, reach, shell_points_of
 from mcz.kinematics.joint_names import find_feet
+from mcz.kinematics.points import origins_of, reach, shell_points_of
 from mcz.kinematics.retargeting.joint_maps import SKELETONS, SMPL_BODY
 from mcz.kinematics.retargeting.retargeting import size_ratio
 from mcz.kinematics.retargeting.turns import _least_turn

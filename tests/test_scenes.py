@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, SceneFile, Signal, Skeleton
-from mcz.kinematics import origins_of, point_set, positions
+from mcz.kinematics.points import origins_of, point_set, positions
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.commands import run
 from tests.glb import Glb

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, OptionError, Signal, Skeleton
-from mcz.kinematics import (
+from mcz.kinematics.points import (
     SHELL_CM,
     origins_of,
     points_of,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.files.reading.source_files import SourceOptions
-from mcz.kinematics import origins_of, shell_points_of
+from mcz.kinematics.points import origins_of, shell_points_of
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.signal import Scaling
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk

@@ -21,7 +21,7 @@ from mcz.container.grammar import GRAMMAR
 from mcz.model.numbers import Grid, GridFlag, GridKind, printed_base, rules, values_of_texts
 from mcz.model.schema import parse
 from mcz.sources import FORMATS
-from mcz.sources.c3d import restore as c3d_restore
+from mcz.sources.c3d import data_section
 from mcz.sources.c3d.layout import Kind
 from mcz.sources.tables import opensim
 from mcz.sources.tables.layout import PHRASES, TableTemplate
@@ -322,14 +322,14 @@ def test_worked_example_of_a_table() -> None:
 def test_fields_of_c3d() -> None:
     rows = table_after(section("Template and detail of C3D"), "| kind | size | content |")
     assert [(int(row[0]), int(row[1])) for row in rows] == [(kind, kind.size) for kind in Kind]
-    assert f"a block has {c3d_restore.BLOCK} bytes" in rows[-1][2]
+    assert f"a block has {data_section.BLOCK} bytes" in rows[-1][2]
 
 
 def test_signals_of_c3d() -> None:
     rows = table_after(section("Template and detail of C3D"), "| signal | needed where |")
-    assert f"{c3d_restore.ROTATION_WORDS} rotations" in [row[2] for row in rows]
+    assert f"{data_section.ROTATION_WORDS} rotations" in [row[2] for row in rows]
     assert "SCALED or INTEGER" in rows[0][4]
-    assert {kind.name for kind in c3d_restore.INTEGERS} == {"SCALED", "INTEGER"}
+    assert {kind.name for kind in data_section.INTEGERS} == {"SCALED", "INTEGER"}
 
 
 def test_sizes_and_ratios() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
-from mcz.kinematics import origins_of
+from mcz.kinematics.points import origins_of
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 
 BVH = replace(bvh_walk(), skeleton=replace(bvh_walk().skeleton, unit_cm=1.0, up_axis="z"))

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz.codecs.contract import Layout
-from mcz.kinematics import reach
 from mcz.kinematics.angles import unwrap
+from mcz.kinematics.points import reach
 from mcz.model.motion import Motion, Skeleton
 
 Floats = NDArray[np.float64]

@@ -20,8 +20,8 @@ from mcz.files.reading.sizes import clip_ratios, clip_sizes
 from mcz.files.writing.clip_writer import write_trial
 from mcz.files.writing.planning import prepare
 from mcz.files.writing.signal_source import MemorySource
-from mcz.kinematics import SHELL_CM
 from mcz.kinematics.metrics.figures import NO_CONTACTS
+from mcz.kinematics.points import SHELL_CM
 from mcz.model.motion import Motion
 from mcz.model.types import JsonObject, Params
 

@@ -102,7 +102,7 @@ def _source_output(clip: Clip, part: ClipSelection) -> Output:
 
 def _refuse_positions(clip: Clip) -> None:
     """Raise Failure for positions whose skeleton is in the file and can be fitted to them."""
-    from mcz.kinematics import point_set
+    from mcz.kinematics.points import point_set
 
     if clip.skeleton.base and point_set(clip.skeleton) == "markers":
         text = f"{clip.container.source.name}: clip {clip.name!r} holds positions"

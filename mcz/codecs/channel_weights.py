@@ -15,9 +15,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from mcz.errors import MczError, OptionError
-from mcz.kinematics import depths, reach
 from mcz.kinematics.chain import Chain, Link, Pose, to_world
-from mcz.kinematics.points import point_position, points_of
+from mcz.kinematics.points import depths, point_position, points_of, reach
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, Skeleton
 from mcz.model.types import Bools, Floats
 

@@ -22,7 +22,7 @@ from mcz.codecs.transforms.bases import (
     learn_bases,
 )
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics import point_names, positions
+from mcz.kinematics.points import point_names, positions
 from mcz.model.motion import Motion
 from mcz.model.skeleton import column_of
 from mcz.model.types import Floats, JsonObject

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import mcz
-from mcz.kinematics import origins_of, positions_of
-from mcz.kinematics.points import listed_points
+from mcz.kinematics.points import listed_points, origins_of, positions_of
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.blender.clips import stretching_arm
 from tests.skeletons import skeletons, values_for

@@ -17,8 +17,7 @@ from mcz.container.limits import BASE
 from mcz.container.writer import Writer
 from mcz.files.writing.clip_writer import write_plan
 from mcz.files.writing.planning import Prepared, StoredSkeleton, plan_clip
-from mcz.kinematics import point_names, points_and_markers_of
-from mcz.kinematics.points import NOTE, in_positions
+from mcz.kinematics.points import NOTE, in_positions, point_names, points_and_markers_of
 from mcz.sources.sample import bvh_walk, marker_walk
 from tests.commands import Call
 

@@ -15,7 +15,7 @@ from mcz.codecs.basis_models import Basis, parse_bases
 from mcz.codecs.space import COURSES
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.files.reading.sizes import clip_sizes
-from mcz.kinematics import point_names
+from mcz.kinematics.points import point_names
 from mcz.model.motion import Signal
 from mcz.model.schema import parse
 from tests.codecs.lossy import (

@@ -14,8 +14,8 @@ import mcz
 from mcz.codecs.curves import qbc, streams
 from mcz.codecs.curves.choices import STEP_SHARE
 from mcz.codecs.parameters import SCALED
-from mcz.kinematics import reach
 from mcz.kinematics.angles import unwrap
+from mcz.kinematics.points import reach
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.schema import parse
 from tests.codecs import lossy

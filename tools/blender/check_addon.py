@@ -22,8 +22,7 @@ import bpy
 import numpy as np
 
 import mcz
-from mcz.kinematics import point_set
-from mcz.kinematics.points import listed_points
+from mcz.kinematics.points import listed_points, point_set
 
 SAMPLED = 60  # frames at most
 OTHERS = {"click", "fsspec", "pywt"}  # not all Blenders have them
@@ -125,7 +124,7 @@ def compare_positions(
 
 def figure(wanted: np.ndarray, skeleton: mcz.Skeleton, scale: float) -> float:
     """The size of a skeleton, or of the box around markers."""
-    from mcz.kinematics import reach
+    from mcz.kinematics.points import reach
 
     if point_set(skeleton) == "markers":
         return float(np.nanmax(np.nanmax(wanted, axis=1) - np.nanmin(wanted, axis=1)))
@@ -202,7 +201,7 @@ def export_and_compare(
 
 def apart(first: mcz.Motion, second: mcz.Motion, options: dict[str, Any]) -> float:
     """The greatest distance between joints (or markers) of both, in sizes of the skeleton."""
-    from mcz.kinematics import origins_of
+    from mcz.kinematics.points import origins_of
 
     if point_set(first.skeleton) == "markers":
         one, other = mcz.positions(first), mcz.positions(second)

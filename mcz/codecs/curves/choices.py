@@ -15,7 +15,7 @@ from mcz.codecs.contract import Layout
 from mcz.codecs.parameters import SCALED, preset_values
 from mcz.codecs.segments import segment_frames_of
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics import reach
+from mcz.kinematics.points import reach
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Skeleton
 from mcz.model.types import Bools, Floats, Ints, Params, Settings
 

@@ -43,8 +43,8 @@ from mcz.codecs.segments import sample, skeleton_of
 from mcz.codecs.source_readers import FrameReader
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
-from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
+from mcz.kinematics.points import reach
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
 from mcz.model.schema import parse
 from mcz.model.types import Floats, Params, Settings

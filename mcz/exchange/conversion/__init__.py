@@ -18,8 +18,7 @@ from mcz.exchange.conversion.losses import (
 from mcz.exchange.conversion.marker_fit import Fit, from_positions
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import Hint
-from mcz.kinematics import point_set
-from mcz.kinematics.points import in_positions
+from mcz.kinematics.points import in_positions, point_set
 from mcz.model.clock import Timeline
 from mcz.model.motion import Motion
 from mcz.model.numbers import Grid, GridKind

@@ -8,8 +8,8 @@ import numpy as np
 
 from mcz.errors import MotionError
 from mcz.exchange.conversion.losses import first_gap
-from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, multiply_matrices
+from mcz.kinematics.points import point_set
 from mcz.kinematics.rotations import euler_angles, euler_order
 from mcz.model.motion import (
     ORIGIN,

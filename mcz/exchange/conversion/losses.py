@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.files.reading.source_files import recording
-from mcz.kinematics import point_set
+from mcz.kinematics.points import point_set
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.clock import TIMES, TOLERANCE, numbers_or_rows
 from mcz.model.motion import Motion

@@ -10,9 +10,15 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.exchange.conversion.hierarchy import PRINTED
-from mcz.kinematics import point_names, point_set, points_and_markers_of, positions, positions_of
 from mcz.kinematics.inverse import solve_ik
-from mcz.kinematics.points import without_note
+from mcz.kinematics.points import (
+    point_names,
+    point_set,
+    points_and_markers_of,
+    positions,
+    positions_of,
+    without_note,
+)
 from mcz.kinematics.targets import unsolved_channels
 from mcz.model.motion import Motion, Signal, Skeleton
 from mcz.model.text_format import fields_text

@@ -12,9 +12,9 @@ from mcz.exchange.datasets.fields import WHOLE, Field, Rows, SignalShape, Subjec
 from mcz.exchange.datasets.humanml import JOINTS, N_FEATURES, humanml3d
 from mcz.files.reading.clip import Clip
 from mcz.hints import Hint
-from mcz.kinematics import point_names
 from mcz.kinematics.contacts import FootTracks
 from mcz.kinematics.frames import frame_poses_of, joint_numbers, scale_to
+from mcz.kinematics.points import point_names
 from mcz.kinematics.poses.conversions import from_matrices
 from mcz.kinematics.poses.trajectories import accelerations_of, find_points, velocities_of
 from mcz.kinematics.rotations import matrices_of_vectors

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics import first_points
 from mcz.kinematics.frames import FramePoses
 from mcz.kinematics.joint_names import find_feet
+from mcz.kinematics.points import first_points
 from mcz.kinematics.poses.trajectories import point_names
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import joint_columns

@@ -31,7 +31,7 @@ from mcz.files.reading.views import (
     preview,
 )
 from mcz.hints import Hint
-from mcz.kinematics import point_names
+from mcz.kinematics.points import point_names
 from mcz.model.clock import (
     TIMES,
     Counting,

@@ -18,8 +18,7 @@ from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.reading.views import Masked
 from mcz.hints import Hint
-from mcz.kinematics import point_set
-from mcz.kinematics.points import SEPARATOR
+from mcz.kinematics.points import SEPARATOR, point_set
 from mcz.model.motion import Motion, Signal, Skeleton, joint_columns
 from mcz.model.skeleton import Joints, joint_list
 from mcz.model.types import Bools, Floats, Values

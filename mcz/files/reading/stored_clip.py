@@ -28,7 +28,7 @@ from mcz.files.reading.source_files import (
     source_info,
     sourced_skeleton,
 )
-from mcz.kinematics import point_names
+from mcz.kinematics.points import point_names
 from mcz.model.motion import Skeleton
 from mcz.model.schema import parse
 from mcz.model.signal import Scaling

@@ -19,8 +19,7 @@ from mcz.container.scanner import is_plain_path
 from mcz.errors import MotionError, OptionError
 from mcz.files.reading.source_files import stating_rate
 from mcz.files.writing.signal_source import MemorySource, as_stored, group_kind, settle
-from mcz.kinematics import point_set
-from mcz.kinematics.points import in_positions
+from mcz.kinematics.points import in_positions, point_set
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.clock import TIMES
 from mcz.model.motion import ROLES, Motion, Signal, Skeleton, Source

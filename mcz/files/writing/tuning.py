@@ -38,7 +38,7 @@ from mcz.files.writing.trials import (
     weigh_joints,
 )
 from mcz.hints import Hint
-from mcz.kinematics import positions_of
+from mcz.kinematics.points import positions_of
 from mcz.model.motion import Motion
 from mcz.model.types import JsonObject, Params
 

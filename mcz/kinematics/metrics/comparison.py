@@ -8,15 +8,6 @@ import numpy as np
 
 from mcz.errors import MczError, MotionError
 from mcz.hints import Hint, Remark
-from mcz.kinematics import (
-    SHELL_CM,
-    Places,
-    places_of,
-    point_names,
-    point_set,
-    points_of,
-    positions_of,
-)
 from mcz.kinematics.contacts import Contacts, FootTracks
 from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.metrics.figures import Comparison, JointFigures, Sliding, sliding
@@ -29,7 +20,16 @@ from mcz.kinematics.metrics.sums import (
     ShellErrors,
     scale_figure,
 )
-from mcz.kinematics.points import check_radius
+from mcz.kinematics.points import (
+    SHELL_CM,
+    Places,
+    check_radius,
+    places_of,
+    point_names,
+    point_set,
+    points_of,
+    positions_of,
+)
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.motion import POSITION_KINDS, Motion, Signal, Skeleton
 from mcz.model.types import Floats

@@ -13,10 +13,10 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from mcz.errors import MczError, MotionError
-from mcz.kinematics import SHELL_CM, origins_of, point_set
 from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.metrics.comparison import compare
 from mcz.kinematics.metrics.figures import Comparison
+from mcz.kinematics.points import SHELL_CM, origins_of, point_set
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.text_format import fields_text

@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics import first_points
-from mcz.kinematics import point_names as names_of_points
 from mcz.kinematics.frames import (
     Frames,
     MotionLike,
@@ -25,6 +23,8 @@ from mcz.kinematics.frames import (
     scale_to,
     values_of,
 )
+from mcz.kinematics.points import first_points
+from mcz.kinematics.points import point_names as names_of_points
 from mcz.kinematics.poses.conversions import from_matrices
 from mcz.model.clock import known_timeline
 from mcz.model.motion import Skeleton

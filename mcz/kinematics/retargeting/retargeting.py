@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics import origins_of, point_set, reach
 from mcz.kinematics.chain import IDENTITY, Chain, multiply_matrices, to_world
 from mcz.kinematics.joint_names import is_foot
+from mcz.kinematics.points import origins_of, point_set, reach
 from mcz.kinematics.rest_pose import rest_positions
 from mcz.kinematics.retargeting.joint_maps import (
     check_channels,

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mcz.errors import MczError, MotionError
-from mcz.kinematics import origins_of, positions_of
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.metrics import compare
 from mcz.kinematics.metrics.diff_document import joint_errors, pairs_of
 from mcz.kinematics.metrics.sums import Distances, scale_figure
+from mcz.kinematics.points import origins_of, positions_of
 from mcz.model.motion import Motion
 from mcz.model.types import Settings
 from mcz.show.pictures.bodies import MIDDLE, Track, track_of

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 from mcz.errors import AccessError, MczError, MotionError, reason_of
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import open as mcz_open
-from mcz.kinematics import positions_of
 from mcz.kinematics.joint_names import sides_of
-from mcz.kinematics.points import first_points, listed_points
+from mcz.kinematics.points import first_points, listed_points, positions_of
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.skeleton import column_of, signs_of
 from mcz.model.text_format import count_text, quote_name

@@ -1,5 +1,5 @@
 """C3D: points, analog channels and parameters.
 
-``c3d`` reads and writes files, ``shape`` checks their sections, ``layout`` keeps all bytes beside
-the data, ``recording`` has the metadata; ``plain`` writes motions that come from elsewhere.
+``c3d`` reads and writes files, ``data_section`` checks and restores their data, ``layout`` keeps
+all other bytes, ``recording`` has the metadata; ``plain`` writes motions that come from elsewhere.
 """

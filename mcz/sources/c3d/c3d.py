@@ -19,11 +19,15 @@ from mcz.model.numbers import Grid, GridKind
 from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.model.signal import Scaling
 from mcz.model.types import Items, Values
+from mcz.sources.c3d.data_section import Shape, find_shape, restore_c3d
 from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT, Kind, Layout, ordered_fields
 from mcz.sources.c3d.parameters import (
     FLOAT,
     INTEGER,
     OUTPUTS,
+    ROTATION_WORDS,
+    WORD_OF_FIRST,
+    WORD_OF_LAST,
     Parameters,
     Split,
     decode_texts,
@@ -35,8 +39,6 @@ from mcz.sources.c3d.parameters import (
 )
 from mcz.sources.c3d.plain import plain_c3d
 from mcz.sources.c3d.recording import is_unsigned, recording_of
-from mcz.sources.c3d.restore import restore_c3d
-from mcz.sources.c3d.shape import ROTATION_WORDS, WORD_OF_FIRST, WORD_OF_LAST, Shape, find_shape
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54}
 POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)

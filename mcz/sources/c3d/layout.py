@@ -14,8 +14,16 @@ from construct import Int8ul
 
 from mcz.errors import FormatError, LimitError
 from mcz.model.schema import SIZED, UVARINT, Record, bounded, build, counted, field, one_of, parse
-from mcz.sources.c3d.parameters import DEC, INTEL, SGI, Order, Split, split_of
-from mcz.sources.c3d.shape import COUNTED, ROTATION_WORDS
+from mcz.sources.c3d.parameters import (
+    DEC,
+    INTEL,
+    MAX_COUNT,
+    ROTATION_WORDS,
+    SGI,
+    Order,
+    Split,
+    split_of,
+)
 
 FORMAT, OUTPUTS_FORMAT = "c3d", "c3d-outputs"  # names in the registry of source formats
 MAX_ZEROS = 2**20  # that a detail counts instead of holding them
@@ -38,9 +46,9 @@ class Kind(IntEnum):
         return 4 if self in (Kind.COUNT_FLOAT, Kind.FIRST_LONG, Kind.LAST_LONG) else 2
 
 
-_WORD = bounded(UVARINT, 0, COUNTED)  # C3D-05
+_WORD = bounded(UVARINT, 0, MAX_COUNT)  # C3D-05
 
-_POSITIVE_WORD = bounded(_WORD, 1, COUNTED)
+_POSITIVE_WORD = bounded(_WORD, 1, MAX_COUNT)
 
 
 class C3dField(Record):

@@ -25,6 +25,9 @@ from mcz.model.numbers import Grid, GridKind
 
 BLOCK = 512
 WORD_OF_START = 16  # offset in the header: first block of the data
+WORD_OF_FIRST, WORD_OF_LAST = 6, 8  # offsets of the frame numbers in the header
+MAX_COUNT = 65_535  # the most that a word can count
+ROTATION_WORDS = 17  # floats of a rotation: a 4 x 4 matrix and its reliability
 MAX_BLOCKS = 255  # of a parameter section: its length is a byte
 INTEL, DEC, SGI = 84, 85, 86  # processor bytes
 TEXT, BYTE, INTEGER, FLOAT = -1, 1, 2, 4  # types of parameters; the magnitude is a size

@@ -17,6 +17,7 @@ from mcz.errors import MotionError
 from mcz.model.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.signal import Scaling
+from mcz.sources.c3d.data_section import field_bytes, valid_points
 from mcz.sources.c3d.layout import Kind, Layout
 from mcz.sources.c3d.parameters import (
     BLOCK,
@@ -24,15 +25,16 @@ from mcz.sources.c3d.parameters import (
     INTEGER,
     INTEL,
     MAX_BLOCKS,
+    MAX_COUNT,
     OUTPUTS,
     TEXT,
     UNITS_OF,
+    WORD_OF_FIRST,
+    WORD_OF_LAST,
     Listed,
     Order,
     describe_outputs,
 )
-from mcz.sources.c3d.restore import field_bytes, valid_points
-from mcz.sources.c3d.shape import COUNTED, WORD_OF_FIRST, WORD_OF_LAST
 
 UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m", 2.54: "in"}
 KNOWN = ("residuals", "analog", OUTPUTS)  # roles of signals beside the points
@@ -60,8 +62,8 @@ def plain_c3d(motion: Motion) -> Motion:
     n_points = sum(signal.n_channels // 3 for signal in placed)
     n_channels = analog.n_channels if analog else 0
     subframes = analog.samples_per_frame if analog and n_channels else 1
-    if max(n_points, n_channels * subframes) > COUNTED:
-        raise MotionError(f"C3D allows at most {COUNTED} points and analog samples a frame")
+    if max(n_points, n_channels * subframes) > MAX_COUNT:
+        raise MotionError(f"C3D allows at most {MAX_COUNT} points and analog samples a frame")
     if residuals is not None and residuals.n_channels != n_points:
         raise MotionError(f"{residuals.n_channels} residuals do not fit {n_points} points")
     names = [joint.name for joint in motion.skeleton.joints]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.kinematics import point_set
+from mcz.kinematics.points import point_set
 
 from .armatures import animate, armature_of
 from .clips import Loaded

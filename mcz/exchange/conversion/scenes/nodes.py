@@ -19,10 +19,10 @@ from mcz.errors import MotionError
 from mcz.exchange.conversion.hierarchy import is_moving, is_stretching, loose_tails
 from mcz.exchange.conversion.losses import first_gap, left_out
 from mcz.hints import Hint
-from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, multiply_matrices
 from mcz.kinematics.frames import frame_poses_of
 from mcz.kinematics.joint_names import sides_of
+from mcz.kinematics.points import point_set
 from mcz.kinematics.poses.conversions import from_matrices
 from mcz.model.clock import Timeline
 from mcz.model.motion import TURNING_KINDS, Motion, check_poses
