@@ -19,7 +19,7 @@ import mcz
 from mcz import Motion, OptionError
 from mcz.bench import peers, report, sweep, tasks
 from mcz.bench.cases import Case, Variant, find_cases, load, preset_of, variants_of
-from mcz.bench.measure import Settings, cpu_seconds, ladder, measure, peak_bytes, speeds
+from mcz.bench.measure import DialRange, cpu_seconds, ladder, measure, peak_bytes, speeds
 from mcz.bench.report import bench
 from mcz.bench.sweep import bd_rate, bd_sqnr
 from mcz.bench.tables import Table
@@ -89,7 +89,7 @@ def test_a_ladder_has_evenly_spaced_sizes(rises: bool, whole: bool) -> None:
     def size(setting: float) -> float:
         return 50.0 * setting**0.5 if rises else 50_000.0 / setting**0.5
 
-    found = ladder(size, Settings(dial), (10_000.0, 1_000.0), 8)
+    found = ladder(size, DialRange(dial), (10_000.0, 1_000.0), 8)
     sizes = [size(setting) for setting in found]
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[0] == pytest.approx(10_000, rel=0.2)
@@ -100,7 +100,7 @@ def test_a_ladder_has_evenly_spaced_sizes(rises: bool, whole: bool) -> None:
 
 
 def test_a_ladder_ends_where_the_dial_or_the_codec_does() -> None:
-    settings = Settings(Dial("q", 2.0**-20, 2.0**20))
+    settings = DialRange(Dial("q", 2.0**-20, 2.0**20))
 
     def size(setting: float) -> float:
         if setting > 100:
@@ -114,7 +114,7 @@ def test_a_ladder_ends_where_the_dial_or_the_codec_does() -> None:
 
 
 def test_a_dial_that_does_little_at_first_is_followed() -> None:
-    settings = Settings(Dial("a", 0.25, 2.0**20, rises=True))
+    settings = DialRange(Dial("a", 0.25, 2.0**20, rises=True))
 
     def size(setting: float) -> float:
         return 300.0 + 6 * math.sin(setting) if setting < 20 else 15.0 * setting

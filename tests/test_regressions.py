@@ -28,10 +28,10 @@ from mcz.files.writing.clip_writer import write_clip
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources import FORMATS
 from mcz.sources.c3d import c3d
-from mcz.sources.restore import Cells
+from mcz.sources.restore import PrintedCells
 from mcz.sources.sample import marker_walk, write_samples
 from mcz.sources.text.hierarchy import write_hierarchy
-from mcz.sources.text.layout import MAX_RUNS, Layout, Pattern, Run
+from mcz.sources.text.layout import MAX_RUNS, FrameLayout, Pattern, Run
 from tests.clocked_files import bvh
 from tests.commands import run
 from tests.motions import smooth, write_bytes
@@ -194,7 +194,7 @@ def test_rates_that_are_none(rate: object) -> None:
 def test_runs_are_limited_when_written() -> None:
     runs = tuple(Run(b" ", column) for column in range(MAX_RUNS + 1))
     with pytest.raises(mcz.LimitError, match="runs"):
-        Layout((b"",), (Pattern(runs, b"\n"),)).build()
+        FrameLayout((b"",), (Pattern(runs, b"\n"),)).build()
 
 
 def test_salvage_gives_up_where_everything_looks_like_a_chunk() -> None:
@@ -208,7 +208,7 @@ def test_salvage_gives_up_where_everything_looks_like_a_chunk() -> None:
 
 def test_equal_numbers_are_printed_once() -> None:
     signal = Signal(np.full((50_000, 3), 1 / 3), (Grid(GridKind.TEXT64),) * 3)
-    cells = Cells(signal, None)
+    cells = PrintedCells(signal, None)
     assert len(cells.texts()) < 100
     assert (
         cells.texts()[cells.start[-1, 2] :][: cells.size[-1, 2]].tobytes() == repr(1 / 3).encode()

@@ -189,7 +189,7 @@ MOST_TRIALS = 24
 Known = dict[float, float]  # setting -> figure
 
 
-class Settings:
+class DialRange:
     """The range of a dial: whole numbers only for a parameter of integers."""
 
     def __init__(self, dial: Dial) -> None:
@@ -203,12 +203,12 @@ class Settings:
         return int(setting) if self.whole else setting
 
 
-def dial_of(variant: Variant) -> tuple[Dial, Settings]:
+def dial_of(variant: Variant) -> tuple[Dial, DialRange]:
     """The dial of a variant's codec, and its settings; OptionError if it has none."""
     codec = codec_by_name(variant.codec)
     if codec.dial is None:
         raise OptionError(f"codec {variant.codec} has no parameter that varies its rate")
-    return codec.dial, Settings(codec.dial)
+    return codec.dial, DialRange(codec.dial)
 
 
 def sweep(case: Case, variant: Variant, n_points: int = N_POINTS) -> list[Record]:
@@ -227,7 +227,7 @@ def sweep(case: Case, variant: Variant, n_points: int = N_POINTS) -> list[Record
 
 
 def ladder(
-    size: Callable[[float], float], settings: Settings, window: tuple[float, float], n_points: int
+    size: Callable[[float], float], settings: DialRange, window: tuple[float, float], n_points: int
 ) -> list[float]:
     """About ``n_points`` settings whose sizes are evenly spaced in logarithms, fine to coarse.
 
@@ -252,7 +252,9 @@ def ladder(
     return order if _falls(known) else order[::-1]
 
 
-def _explore(size: Callable[[float], float], settings: Settings, big: float, small: float) -> Known:
+def _explore(
+    size: Callable[[float], float], settings: DialRange, big: float, small: float
+) -> Known:
     """Sizes from a setting in the middle outwards, until they are beyond ``small`` and ``big``."""
     start = settings.snap(1.0)
     known = {start: size(start)}
@@ -281,7 +283,7 @@ def _falls(known: Known) -> bool:
 
 
 def _widest(
-    known: Known, settings: Settings, big: float, small: float
+    known: Known, settings: DialRange, big: float, small: float
 ) -> tuple[float, float | None]:
     """The widest step of sizes between neighboring settings, in logarithms, and its middle."""
     best: tuple[float, float | None] = (0.0, None)

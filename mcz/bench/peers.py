@@ -55,7 +55,7 @@ def measure(loaded: Loaded) -> list[Record]:
     if motion.signals[0].has_poses:
         values = unwrap(values, motion.skeleton)
     matrix = np.ascontiguousarray(np.nan_to_num(values), np.float32)
-    source = Source(loaded.data, values, matrix, motion.signals[0].to_ordinals()[0])
+    source = PeerInput(loaded.data, values, matrix, motion.signals[0].to_ordinals()[0])
     records = [_measured(loaded, peer) for peer in _peers(source)]
     if "zfp" in installed_peers():
         records += _bounded(loaded, matrix)
@@ -85,7 +85,7 @@ def _record(loaded: Loaded, name: str, what: str, size: int) -> Record:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class PeerInput:
     """One clip as peers take it: its file, its values, and these as points of their grids."""
 
     text: bytes
@@ -104,7 +104,7 @@ class Peer:
     unpack: Callable[[bytes], object]
 
 
-def _peers(source: Source) -> Iterator[Peer]:
+def _peers(source: PeerInput) -> Iterator[Peer]:
     have = installed_peers()
     general: dict[str, tuple[Pack, Pack]] = {
         "gzip -9": (lambda data: gzip.compress(data, 9, mtime=0), gzip.decompress),

@@ -23,7 +23,7 @@ from mcz.model.numbers.text_grids import WIDEST
 from mcz.model.numbers.values import print_rules
 from mcz.model.types import Floats, Ints, Values
 from mcz.sources.text import Items, text_kernels
-from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, RowNotes, parse_layout
+from mcz.sources.text.layout import FRAME_NUMBER, FrameLayout, Pattern, RowNotes, parse_layout
 from mcz.sources.text.rows import MAX_NUMBER
 
 TEXT_LIMIT = 2**26  # bytes that any text may have
@@ -59,7 +59,7 @@ def restore(motion: Motion, source: Source) -> bytes:
     return out.getvalue()
 
 
-def printed_count(layout: Layout, n_rows: int) -> bytes:
+def printed_count(layout: FrameLayout, n_rows: int) -> bytes:
     """The number of rows as a header prints it."""
     return layout.count if layout.count and layout.rows == n_rows else b"%d" % n_rows  # AMC-06
 
@@ -73,7 +73,7 @@ def text_limit(source: Source, shapes: Sequence[tuple[int, int]]) -> int:
 def write_rows(
     out: BytesIO,
     signal: Signal,
-    layout: Layout,
+    layout: FrameLayout,
     notes: RowNotes | None,
     numbers: Ints,
     limit: int,
@@ -89,7 +89,7 @@ def write_rows(
     if notes is not None and prints_frame_numbers(runs):
         texts = [entry for entry in notes.texts if entry[0] < signal.n_rows]  # AMC-06
     missing = None if signal.mask is None else missing
-    for piece in Rows(signal, numbers, runs, texts, missing, limit).pieces():
+    for piece in PrintedRows(signal, numbers, runs, texts, missing, limit).pieces():
         out.write(piece)
     if layout.ending is not None:
         out.seek(-len(runs[-1][0].tail) if runs else 0, SEEK_END)
@@ -102,7 +102,7 @@ def prints_frame_numbers(runs: Sequence[Run]) -> bool:
     return any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
 
 
-def pattern_runs(layout: Layout, notes: RowNotes | None, n_rows: int) -> list[Run]:
+def pattern_runs(layout: FrameLayout, notes: RowNotes | None, n_rows: int) -> list[Run]:
     indices = np.zeros(n_rows, np.int64)
     if notes is not None:
         indices[: len(notes.patterns)] = notes.patterns[:n_rows]
@@ -121,8 +121,8 @@ NEAR = 64  # rows beside one with an odd cell that are taken with it
 
 
 @dataclass(slots=True)
-class Rows:
-    """The rows of a table: most are printed by ``print_rows``, those with odd cells by ``Cells``.
+class PrintedRows:
+    """The rows of a table: ``print_rows`` prints most, ``PrintedCells`` those with odd cells.
 
     ``texts``: (row, odd text of its frame number). ``missing``: what stands where the mask of the
     signal is False, None for its values.
@@ -168,7 +168,9 @@ class Rows:
         whole = (first, last) == (0, self.signal.n_rows)
         signal = self.signal if whole else self.signal.cut(first, last)
         runs = [(p, a - first, b - first) for p, a, b in _clipped(self.runs, first, last)]
-        cells = Cells(signal, self.numbers[first:last] if prints_frame_numbers(runs) else None)
+        cells = PrintedCells(
+            signal, self.numbers[first:last] if prints_frame_numbers(runs) else None
+        )
         odd = [(row - first, text) for row, text in self.texts if first <= row < last]
         rows = np.array([row for row, _ in odd], dtype=np.int64)
         cells.set(rows, np.full_like(rows, -1), [text for _, text in odd])
@@ -244,7 +246,7 @@ INTEGERS = Grid(GridKind.FIXED)
 SHORTEST = Grid(GridKind.TEXT64)
 
 
-class Cells:
+class PrintedCells:
     """Token (row, column) is ``texts[start[row, column]:][:size[row, column]]``.
 
     ``start`` and ``size`` have shape (n_rows, n_channels + 1); the last column holds the frame

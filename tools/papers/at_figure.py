@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from mcz.bench.cases import Case, Variant
-from mcz.bench.measure import MOST_TRIALS, Record, Settings, dial_of, measure
+from mcz.bench.measure import MOST_TRIALS, DialRange, Record, dial_of, measure
 from mcz.errors import MotionError, OptionError
 
 NEAR, CLOSE = 0.002, 1.0005  # of a figure, and of settings: near enough
@@ -59,7 +59,7 @@ def _same_side(a: float, b: float, wanted: float) -> bool:
 
 
 def _bracket(
-    figure: Callable[[float], float], settings: Settings, start: float, wanted: float
+    figure: Callable[[float], float], settings: DialRange, start: float, wanted: float
 ) -> tuple[float, float] | None:
     """Two settings with the figure between theirs, the nearer side of the dial first."""
     first = figure(start)

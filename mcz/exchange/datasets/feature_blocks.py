@@ -20,7 +20,7 @@ import numpy as np
 
 from mcz.errors import AccessError, OptionError, reason_of
 from mcz.exchange.datasets.fields import Arrays
-from mcz.exchange.datasets.sources import Member, Recipe, Sources, timeline_of_member
+from mcz.exchange.datasets.open_files import Member, OpenFiles, Recipe, timeline_of_member
 from mcz.files.reading.file import File
 from mcz.model.types import Floats, Ints, Reals
 
@@ -153,7 +153,7 @@ VERSION = 2  # of the features: counted up if a cached one would be wrong
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class DatasetSettings:
     """Settings of windows and caches."""
 
     recipe: Recipe
@@ -177,11 +177,11 @@ class Blocks:
     """The features of clips, from open files or from the cache; threads may share it."""
 
     def __init__(
-        self, settings: Settings, members: Sequence[Member], given: Mapping[str, File]
+        self, settings: DatasetSettings, members: Sequence[Member], given: Mapping[str, File]
     ) -> None:
         self._recipe = settings.recipe
         targets = {member.target for member in members}
-        self.sources = Sources(given, settings.decoded_bytes, len(targets))
+        self.sources = OpenFiles(given, settings.decoded_bytes, len(targets))
         self._keys: dict[Member, str] = {}
         self.cache: Cache = (
             MemoryCache(settings.feature_bytes)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.errors import OptionError
-from mcz.exchange.datasets.fields import WHOLE, Field, Rows, SignalShape, Subject, Units
+from mcz.exchange.datasets.fields import WHOLE, Field, SignalShape, Subject, SubjectRows, Units
 from mcz.exchange.datasets.humanml import JOINTS, N_FEATURES, humanml3d
 from mcz.files.reading.clip import Clip
 from mcz.hints import Hint
@@ -24,7 +24,7 @@ from mcz.model.text_format import suggest_names
 from mcz.model.types import Floats
 from mcz.model.units import with_axes
 
-Make = Callable[[Subject, Rows], Floats]
+Make = Callable[[Subject, SubjectRows], Floats]
 FORMS = {
     "rot6d": ("6d", (6,)),
     "quat": ("quat", (4,)),
@@ -73,19 +73,19 @@ def _above_root_and_points(subject: Subject) -> list[int]:
     return [0, *_above_points(subject)]
 
 
-def _positions(subject: Subject, rows: Rows) -> Floats:
+def _positions(subject: Subject, rows: SubjectRows) -> Floats:
     return subject.kinematics.positions(rows.values, subject.points) * subject.scale
 
 
-def _root(subject: Subject, rows: Rows) -> Floats:
+def _root(subject: Subject, rows: SubjectRows) -> Floats:
     return subject.kinematics.origins(rows.values, [0])[:, 0] * subject.scale
 
 
-def _velocities(subject: Subject, rows: Rows) -> Floats:
+def _velocities(subject: Subject, rows: SubjectRows) -> Floats:
     return velocities_of(_positions(subject, rows), rows.steps)
 
 
-def _accelerations(subject: Subject, rows: Rows) -> Floats:
+def _accelerations(subject: Subject, rows: SubjectRows) -> Floats:
     return accelerations_of(_positions(subject, rows), rows.steps)
 
 
@@ -93,13 +93,13 @@ def _n_points(subject: Subject) -> tuple[int, ...]:
     return len(subject.points), 3
 
 
-def _foot_speed(subject: Subject, rows: Rows) -> Floats:
+def _foot_speed(subject: Subject, rows: SubjectRows) -> Floats:
     places = subject.kinematics.positions(rows.values, subject.foot_points) * subject.scale
     speeds: Floats = np.linalg.norm(velocities_of(places, rows.steps), axis=-1)
     return speeds
 
 
-def _contacts(subject: Subject, rows: Rows) -> Floats:
+def _contacts(subject: Subject, rows: SubjectRows) -> Floats:
     """1 in frames in which a foot stands, 0 in all others, as ``mcz.contacts`` finds them."""
     skeleton, poses = subject.skeleton, subject.kinematics
     n_frames = len(rows.values)
@@ -126,7 +126,7 @@ class _Heading:
     (n_frames, 3, 3) has the axes of the frame as columns.
     """
 
-    def __init__(self, subject: Subject, rows: Rows) -> None:
+    def __init__(self, subject: Subject, rows: SubjectRows) -> None:
         skeleton, poses = subject.skeleton, subject.kinematics
         column = _up_column(skeleton)
         sign = signs_of(skeleton.up_axis)[column]
@@ -140,12 +140,12 @@ class _Heading:
         self.origins = origins * subject.scale
 
 
-def _heading(subject: Subject, rows: Rows) -> Floats:
+def _heading(subject: Subject, rows: SubjectRows) -> Floats:
     angles = _Heading(subject, rows).angles
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
-def _heading_rate(subject: Subject, rows: Rows) -> Floats:
+def _heading_rate(subject: Subject, rows: SubjectRows) -> Floats:
     angles = _Heading(subject, rows).angles
     steps = np.diff(angles)
     whole_turns = np.zeros(len(angles))
@@ -154,24 +154,24 @@ def _heading_rate(subject: Subject, rows: Rows) -> Floats:
     return velocities_of(smooth[:, None, None], rows.steps)[:, 0]
 
 
-def _heading_positions(subject: Subject, rows: Rows) -> Floats:
+def _heading_positions(subject: Subject, rows: SubjectRows) -> Floats:
     heading = _Heading(subject, rows)
     return (_positions(subject, rows) - heading.origins) @ heading.axes
 
 
-def _heading_velocities(subject: Subject, rows: Rows) -> Floats:
+def _heading_velocities(subject: Subject, rows: SubjectRows) -> Floats:
     return _velocities(subject, rows) @ _Heading(subject, rows).axes
 
 
-def _local_turns(subject: Subject, rows: Rows) -> Floats:
+def _local_turns(subject: Subject, rows: SubjectRows) -> Floats:
     return subject.kinematics.local(rows.values, subject.joints)
 
 
-def _world_turns(subject: Subject, rows: Rows) -> Floats:
+def _world_turns(subject: Subject, rows: SubjectRows) -> Floats:
     return subject.kinematics.world(rows.values, subject.joints)
 
 
-def _heading_turns(subject: Subject, rows: Rows) -> Floats:
+def _heading_turns(subject: Subject, rows: SubjectRows) -> Floats:
     back = np.swapaxes(_Heading(subject, rows).axes, 1, 2)
     return back[:, None] @ _world_turns(subject, rows)
 
@@ -195,7 +195,7 @@ def _humanml3d_joints(subject: Subject) -> tuple[int, ...]:
     return subject.joints[: len(JOINTS)]
 
 
-def _humanml3d(subject: Subject, rows: Rows) -> Floats:
+def _humanml3d(subject: Subject, rows: SubjectRows) -> Floats:
     """``mcz.humanml3d``; the last frame repeats the features of the frame before it."""
     skeleton = subject.skeleton
     column = _up_column(skeleton)

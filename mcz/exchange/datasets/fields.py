@@ -84,7 +84,7 @@ class Units(NamedTuple):
     up: str | None = None
 
 
-class Rows(NamedTuple):
+class SubjectRows(NamedTuple):
     """Channels of frames, (n_frames, n_channels), and the seconds from each frame to the next.
 
     ``signals`` are the values of the signals that fields name, (n_frames, n_channels), or
@@ -95,10 +95,12 @@ class Rows(NamedTuple):
     steps: Floats
     signals: Mapping[str, Floats]
 
-    def part(self, start: int, stop: int) -> Rows:
+    def part(self, start: int, stop: int) -> SubjectRows:
         """Frames start <= f < stop."""
         signals = {name: values[start:stop] for name, values in self.signals.items()}
-        return Rows(self.values[start:stop], self.steps[start : max(start, stop - 1)], signals)
+        return SubjectRows(
+            self.values[start:stop], self.steps[start : max(start, stop - 1)], signals
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +118,7 @@ class Field:
     name: str
     names: str
     shape: Callable[[Subject], tuple[int, ...]]
-    make: Callable[[Subject, Rows], Floats]
+    make: Callable[[Subject, SubjectRows], Floats]
     needs: Callable[[Subject], Iterable[int]]
     reach: int = 0
     posed: bool = True
@@ -147,7 +149,7 @@ def names_of(field: Field, subject: Subject) -> tuple[str, ...]:
 def features_of(
     fields: Iterable[Field],
     subject: Subject,
-    rows: Rows,
+    rows: SubjectRows,
     margins: tuple[int, int],
     dtype: DTypeLike,
 ) -> dict[str, Reals]:

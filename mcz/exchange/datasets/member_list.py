@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mcz.errors import MczError, OptionError
-from mcz.exchange.datasets.feature_blocks import Settings, to_size
+from mcz.exchange.datasets.feature_blocks import DatasetSettings, to_size
 from mcz.exchange.datasets.fields import SignalShape, Units, names_of
-from mcz.exchange.datasets.sources import MOST_OPEN, Member, Recipe, recipe_of
+from mcz.exchange.datasets.open_files import MOST_OPEN, Member, Recipe, recipe_of
 from mcz.exchange.datasets.windows import Dataset
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where, filter_clips
@@ -76,7 +76,9 @@ def dataset(
     window, stride = _cut(window, stride)
     open_files: dict[str, File] = {}
     size = to_size(cache)
-    settings = Settings(recipe, window, stride, size, None if folder is None else Path(folder))
+    settings = DatasetSettings(
+        recipe, window, stride, size, None if folder is None else Path(folder)
+    )
     assumed = None if source_rate is None else frame_rate_of(source_rate, "source_rate")
     agreement = _Agreement(recipe)
     members: list[Member] = []

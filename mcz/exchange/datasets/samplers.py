@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import OptionError
-from mcz.exchange.datasets.sources import Member
+from mcz.exchange.datasets.open_files import Member
 from mcz.files.reading.clip import Clip
 from mcz.model.checks import integer
 

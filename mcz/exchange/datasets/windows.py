@@ -15,13 +15,13 @@ from mcz.errors import OptionError, OutOfRangeError
 from mcz.exchange.datasets.feature_blocks import (
     BLOCK,
     Blocks,
+    DatasetSettings,
     FieldStatistics,
-    Settings,
     statistics_of,
 )
 from mcz.exchange.datasets.fields import Subject, names_of
+from mcz.exchange.datasets.open_files import Member
 from mcz.exchange.datasets.samplers import EPOCH, SEED, SIZE, WindowBatchSampler, WindowSampler
-from mcz.exchange.datasets.sources import Member
 from mcz.files.reading.file import File
 from mcz.kinematics.poses.conversions import continuous_signs
 from mcz.model.checks import row_numbers
@@ -58,7 +58,7 @@ class Dataset:
 
     def __init__(
         self,
-        settings: Settings,
+        settings: DatasetSettings,
         members: Sequence[Member],
         given: Mapping[str, File],
         skipped: Sequence[Member] = (),

@@ -26,7 +26,7 @@ LEAST_LIMIT, MOST_RATIO = 2**26, 16  # contents may always have, or have for eac
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class ArchiveField:
     """A number at offset ``at`` that follows from the bytes from ``start`` to ``stop``."""
 
     at: int
@@ -36,7 +36,7 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
+class ArchiveMember:
     """A member: ``at`` is the offset of its local header, ``start`` and ``stop`` those of its
     bytes; ``entry`` is that of its entry in the central directory.
 
@@ -78,8 +78,8 @@ class Archive:
 
     data: bytes
     size: int
-    members: tuple[Member, ...] = ()
-    fields: tuple[Field, ...] = ()
+    members: tuple[ArchiveMember, ...] = ()
+    fields: tuple[ArchiveField, ...] = ()
     wrong: tuple[str, ...] = ()
 
 
@@ -123,7 +123,9 @@ def read_archive(data: bytes) -> Archive:
     return Archive(whole, len(data), members, tuple(true), tuple(sorted(wrong)))
 
 
-def _with_contents(data: bytes, members: Sequence[Member]) -> tuple[bytes, tuple[Member, ...]]:
+def _with_contents(
+    data: bytes, members: Sequence[ArchiveMember]
+) -> tuple[bytes, tuple[ArchiveMember, ...]]:
     """The file followed by the contents of deflated members, and the members with their place."""
     left = max(LEAST_LIMIT, MOST_RATIO * len(data))
     parts, placed, end = [data], [], len(data)
@@ -173,7 +175,7 @@ def _ends(data: bytes) -> tuple[int, int, int, int]:
     return end, stop, start, n_members
 
 
-def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
+def _entry(data: bytes, at: int, end: int) -> tuple[ArchiveMember, int]:
     """The member whose entry of the directory is at ``at``, and where the next entry is."""
     if at + 46 > end or data[at : at + 4] != CENTRAL:
         raise SourceError("the directory has an invalid entry", offset=at)
@@ -190,7 +192,7 @@ def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
     start = local + 30 + _number(data, local + 26, 2) + _number(data, local + 28, 2)
     if start + packed > len(data):
         raise SourceError(f"member {name!r} of {packed} bytes extends past the end", offset=local)
-    member = Member(name, method, flags, local, start, start + packed, at, size)
+    member = ArchiveMember(name, method, flags, local, start, start + packed, at, size)
     if member.is_stored and size != packed:
         raise SourceError(
             f"member {name!r} is stored uncompressed, but its sizes differ: {packed} and "
@@ -201,7 +203,7 @@ def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
     return member, next_entry
 
 
-def _check_names(members: list[Member]) -> None:
+def _check_names(members: list[ArchiveMember]) -> None:
     """Raise SourceError for names of which NumPy and zipfile make one array."""
     seen = set()
     for member in members:
@@ -211,7 +213,7 @@ def _check_names(members: list[Member]) -> None:
         seen.add(name)
 
 
-def _check_local(data: bytes, member: Member, raw: bytes) -> None:
+def _check_local(data: bytes, member: ArchiveMember, raw: bytes) -> None:
     """Raise SourceError if the local header of a member is about something else."""
     at = member.at
     if data[at + 30 : at + 30 + _number(data, at + 26, 2)] != raw:
@@ -238,7 +240,7 @@ def _wide_fields(data: bytes, at: int, sizes: list[int]) -> list[tuple[int, int,
     return _zip64_numbers(data, plain, at + 46 + sizes[0], sizes[1])
 
 
-def _local_sizes(data: bytes, member: Member) -> list[tuple[int, int, int]]:
+def _local_sizes(data: bytes, member: ArchiveMember) -> list[tuple[int, int, int]]:
     """Value, offset and bytes of the two sizes of a local header, size first."""
     at = member.at
     extra = at + 30 + _number(data, at + 26, 2)
@@ -268,7 +270,7 @@ def _zip64(data: bytes, at: int, stop: int) -> tuple[int, int]:
     return 0, 0
 
 
-def _of_members(data: bytes, members: tuple[Member, ...]) -> Iterator[Field]:
+def _of_members(data: bytes, members: tuple[ArchiveMember, ...]) -> Iterator[ArchiveField]:
     """The numbers of headers, entries and descriptors that may follow from the members."""
     for member in members:
         span = member.start, member.stop
@@ -278,34 +280,36 @@ def _of_members(data: bytes, members: tuple[Member, ...]) -> Iterator[Field]:
         for pair in (_local_sizes(data, member), entry_fields):
             for (_, at, width), of in zip(pair, (member.contents, span), strict=True):
                 if of is not None:
-                    yield Field(at, _of_width(width), *of)
+                    yield ArchiveField(at, _of_width(width), *of)
         if member.contents is not None:
-            yield Field(member.at + 14, Kind.CRC, *member.contents)
-            yield Field(member.entry + 16, Kind.CRC, *member.contents)
-        yield Field(place[1], _of_width(place[2]), 0, member.at)
+            yield ArchiveField(member.at + 14, Kind.CRC, *member.contents)
+            yield ArchiveField(member.entry + 16, Kind.CRC, *member.contents)
+        yield ArchiveField(place[1], _of_width(place[2]), 0, member.at)
         if member.flags & DESCRIBED and member.contents is not None:
             yield from _descriptor(data, member, member.contents)
 
 
-def _of_directory(data: bytes, start: int, end: int, tail: int) -> Iterator[Field]:
+def _of_directory(data: bytes, start: int, end: int, tail: int) -> Iterator[ArchiveField]:
     """The numbers at the end, at ``tail``, that may follow from a directory."""
-    yield Field(tail + 12, Kind.SIZE4, start, end)
-    yield Field(tail + 16, Kind.SIZE4, 0, start)
+    yield ArchiveField(tail + 12, Kind.SIZE4, start, end)
+    yield ArchiveField(tail + 16, Kind.SIZE4, 0, start)
     if data[end : end + 4] == END64:
-        yield Field(end + 40, Kind.SIZE8, start, end)
-        yield Field(end + 48, Kind.SIZE8, 0, start)
-        yield Field(tail - 12, Kind.SIZE8, 0, end)
+        yield ArchiveField(end + 40, Kind.SIZE8, start, end)
+        yield ArchiveField(end + 48, Kind.SIZE8, 0, start)
+        yield ArchiveField(tail - 12, Kind.SIZE8, 0, end)
 
 
-def _descriptor(data: bytes, member: Member, contents: tuple[int, int]) -> Iterator[Field]:
+def _descriptor(
+    data: bytes, member: ArchiveMember, contents: tuple[int, int]
+) -> Iterator[ArchiveField]:
     """The fields of what may follow the bytes of a member."""
     at = member.stop + (4 if data[member.stop : member.stop + 4] == DESCRIPTOR else 0)
     packed = member.stop - member.start
     wide = _number(data, at + 4, 8) == packed and _number(data, at + 12, 8) == member.size
     width = 8 if wide else 4
-    yield Field(at, Kind.CRC, *contents)
-    yield Field(at + 4, _of_width(width), member.start, member.stop)
-    yield Field(at + 4 + width, _of_width(width), *contents)
+    yield ArchiveField(at, Kind.CRC, *contents)
+    yield ArchiveField(at + 4, _of_width(width), member.start, member.stop)
+    yield ArchiveField(at + 4 + width, _of_width(width), *contents)
 
 
 def _of_width(width: int) -> Kind:

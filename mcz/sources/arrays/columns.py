@@ -16,7 +16,7 @@ from mcz.errors import SourceError
 from mcz.model.motion import Channel, Signal
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Items, Values
-from mcz.sources.arrays.archive import Archive, Member, read_archive
+from mcz.sources.arrays.archive import Archive, ArchiveMember, read_archive
 from mcz.sources.arrays.layout import TYPES
 
 MAGIC = b"\x93NUMPY"
@@ -378,7 +378,7 @@ def npz_arrays(data: bytes) -> tuple[list[Array], Archive]:
     return [_member(archive.data, member) for member in archive.members], archive
 
 
-def _member(data: bytes, member: Member) -> Array:
+def _member(data: bytes, member: ArchiveMember) -> Array:
     """The array in a member; ``data`` is that of its archive."""
     name = member.name.removesuffix(".npy")
     if member.contents is None:

@@ -38,8 +38,8 @@ MAX_PER_FRAME = 1000  # rows a frame of an array that is longer than the motion
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """A signal to be: ``words`` are arrays (rows, columns), whose columns it has in order."""
+class ArraySignal:
+    """The arrays of a signal: ``words`` are (rows, columns), whose columns it has in order."""
 
     name: str
     words: list[Items]
@@ -56,7 +56,7 @@ class Meaning:
     rate: Fraction | None
     rate_is_exact: bool
     metadata: dict[str, str]
-    parts: list[Part] = field(default_factory=list)
+    parts: list[ArraySignal] = field(default_factory=list)
     places: dict[int, tuple[int, Sequence[int]]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
@@ -92,13 +92,13 @@ def meaning_of(arrays: Sequence[Array]) -> Meaning:
             fault = times_fault(array.numbers[:, 0].astype(np.float64))
             role = "" if fault else "times"
             meaning.notes += [f"the times do not count: {fault}"] if fault else []
-        part = Part(array.name, [array.numbers], per_frame, channels, role)
+        part = ArraySignal(array.name, [array.numbers], per_frame, channels, role)
         meaning.parts.append(part)
     return meaning
 
 
 def _add_body(meaning: Meaning, body: Body) -> None:
-    meaning.parts.append(Part("motion", body.words, role="motion"))
+    meaning.parts.append(ArraySignal("motion", body.words, role="motion"))
     meaning.places |= {index: (0, columns) for index, columns in body.places.items()}
 
 
@@ -139,7 +139,7 @@ def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> Non
         raise SourceError("; ".join((f"no array of {n_frames} frames", *_reasons(arrays))))
     index = -max(fit)[2]
     array = arrays[index]
-    meaning.parts.append(Part("motion", [array.numbers], role="motion"))
+    meaning.parts.append(ArraySignal("motion", [array.numbers], role="motion"))
     meaning.places[index] = 0, range(array.numbers.shape[1])
     joints = plain_joints(array.head.shape[1:], array.name)
     if is_robot(array):

@@ -16,7 +16,7 @@ import numpy as np
 from mcz.errors import SourceError
 from mcz.model.motion import Source
 from mcz.model.types import JsonObject
-from mcz.sources.arrays.archive import Archive, Field, read_archive
+from mcz.sources.arrays.archive import Archive, ArchiveField, read_archive
 from mcz.sources.arrays.columns import MAGIC, MAX_TEXT, Array, Head, array_of, read_head
 from mcz.sources.arrays.columns import is_motion as is_array_motion
 from mcz.sources.arrays.layout import (
@@ -123,7 +123,9 @@ def _read_machine(machine: Machine) -> Pickle:
             tensor.content = None
     reader = _Reader(machine, _clips(machine, root))
     arrays, fields = reader.read(root)
-    fields += [Field(field, Kind.SIZE8, start, stop) for field, start, stop in machine.frames]
+    fields += [
+        ArchiveField(field, Kind.SIZE8, start, stop) for field, start, stop in machine.frames
+    ]
     fields.sort(key=lambda field: field.at)
     archive = Archive(data, len(data), fields=tuple(fields))
     return Pickle(arrays, archive, clip, clips=reader.members)
@@ -195,12 +197,12 @@ class _Reader:
         self.clip: str | None = None  # that arrays are added to
         self.data = machine.data
         self.arrays: list[Array] = []
-        self.fields: list[Field] = []
+        self.fields: list[ArchiveField] = []
         self.n_facts = 0
         self.used: set[int] = set()  # offsets that an array has
         self.names: set[str] = set()
 
-    def read(self, root: object) -> tuple[list[Array], list[Field]]:
+    def read(self, root: object) -> tuple[list[Array], list[ArchiveField]]:
         """The arrays in order, and the lengths of their bytes."""
         seen: set[int] = set()
         waiting: list[tuple[str, str, int, object, str | None]] = [("", "", 0, root, None)]
@@ -243,7 +245,7 @@ class _Reader:
         self._add(array_of(name, self.data, head, raw.stop))
         if raw.count_size:
             kind = {1: Kind.SIZE1, 4: Kind.SIZE4, 8: Kind.SIZE8}[raw.count_size]
-            self.fields.append(Field(raw.start - raw.count_size, kind, raw.start, raw.stop))
+            self.fields.append(ArchiveField(raw.start - raw.count_size, kind, raw.start, raw.stop))
 
     def _head(self, node: PickledArray) -> tuple[Head, str]:
         """The head of an array, and the reason why its bytes are not read, if any."""

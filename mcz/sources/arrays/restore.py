@@ -20,7 +20,7 @@ from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Motion, Signal
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Ints, Items
-from mcz.sources.arrays.archive import Archive, Member
+from mcz.sources.arrays.archive import Archive, ArchiveMember
 from mcz.sources.arrays.columns import Head, file_columns
 from mcz.sources.arrays.deflate import describe_stream, restore_stream
 from mcz.sources.arrays.layout import (
@@ -276,12 +276,12 @@ def pieces_of(
     ]
 
 
-def _is_restored(member: Member) -> bool:
+def _is_restored(member: ArchiveMember) -> bool:
     """Return True if the stream of a member is restored from its contents."""
     return member.is_deflated and member.contents is not None and member.size > 0
 
 
-def _of_stream(data: bytes, member: Member) -> tuple[int, int, Piece]:
+def _of_stream(data: bytes, member: ArchiveMember) -> tuple[int, int, Piece]:
     assert member.contents is not None
     start, stop = member.contents
     part = describe_stream(data[member.start : member.stop], data[start:stop])

@@ -20,7 +20,7 @@ from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.model.signal import Scaling
 from mcz.model.types import Items, Values
 from mcz.sources.c3d.data_section import Shape, find_shape, restore_c3d
-from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT, Kind, Layout, ordered_fields
+from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT, C3dLayout, Kind, ordered_fields
 from mcz.sources.c3d.parameters import (
     FLOAT,
     INTEGER,
@@ -238,7 +238,7 @@ def _rotation_channels(parameters: Parameters, shape: Shape) -> tuple[Channel, .
     return tuple(Channel("", f"{name} {part}") for name in names for part in parts)
 
 
-def _layout(data: bytes, parameters: Parameters, shape: Shape, split: Split) -> Layout:
+def _layout(data: bytes, parameters: Parameters, shape: Shape, split: Split) -> C3dLayout:
     """All that lies around the data, and which fields count frames."""
     fields = [(WORD_OF_FIRST, Kind.FIRST), (WORD_OF_LAST, Kind.LAST)]
     for group, name, type_, size, kind in FIELDS:
@@ -250,7 +250,7 @@ def _layout(data: bytes, parameters: Parameters, shape: Shape, split: Split) -> 
     if shape.n_rotations:
         gap = data[shape.stop : shape.rotations_at]
         tail = data[shape.rotations_at + shape.n_frames * shape.rotations_size :]
-    return Layout(
+    return C3dLayout(
         parameters.order,
         shape.word,
         shape.n_points,
@@ -269,7 +269,7 @@ def _layout(data: bytes, parameters: Parameters, shape: Shape, split: Split) -> 
     )
 
 
-def _source(data: bytes, layout: Layout) -> Source:
+def _source(data: bytes, layout: C3dLayout) -> Source:
     template, detail = layout.build()
     digest = hashlib.sha256(data).digest()
     return Source(layout.format, template, detail, size=len(data), sha256=digest)

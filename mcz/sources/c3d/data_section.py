@@ -22,7 +22,7 @@ from mcz.errors import FormatError, MotionError, SourceError
 from mcz.model.motion import Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Items, Values
-from mcz.sources.c3d.layout import Kind, Layout, parse_layout
+from mcz.sources.c3d.layout import C3dLayout, Kind, parse_layout
 from mcz.sources.c3d.parameters import (
     BLOCK,
     MAX_COUNT,
@@ -248,7 +248,7 @@ def restore_c3d(motion: Motion, source: Source) -> bytes:
     return _head(motion, layout, len(data)) + data + rest
 
 
-def _head(motion: Motion, layout: Layout, size: int) -> bytes:
+def _head(motion: Motion, layout: C3dLayout, size: int) -> bytes:
     """The bytes before the data section, whose size is given, with fields that fit the motion."""
     whole = motion.n_frames == layout.n_frames
     first = layout.first
@@ -290,7 +290,7 @@ def field_bytes(order: Order, kind: Kind, first: int, n_frames: int, rotations_a
     return order.build_integer(min(max(0, number), MAX_COUNT))
 
 
-def _section(motion: Motion, layout: Layout) -> bytes:
+def _section(motion: Motion, layout: C3dLayout) -> bytes:
     """The data section: of every frame the points, then the samples of the analog channels."""
     n_frames, end = motion.n_frames, 4 * layout.n_points
     n_analog = layout.n_channels * layout.subframes
@@ -303,7 +303,7 @@ def _section(motion: Motion, layout: Layout) -> bytes:
     return words.tobytes()
 
 
-def _fill_points(words: Items, motion: Motion, layout: Layout) -> None:
+def _fill_points(words: Items, motion: Motion, layout: C3dLayout) -> None:
     """The words of all points, which are the first of each row."""
     parts = _parts(motion, layout)
     if not layout.n_points:
@@ -320,7 +320,7 @@ def _fill_points(words: Items, motion: Motion, layout: Layout) -> None:
         at += len(points)
 
 
-def _parts(motion: Motion, layout: Layout) -> list[tuple[Signal, NDArray[np.int64]]]:
+def _parts(motion: Motion, layout: C3dLayout) -> list[tuple[Signal, NDArray[np.int64]]]:
     """The signals of the points, checked, and the numbers of their points in the file."""
     split = layout.split
     parts = [(_check_signal(motion.signals[0], 3 * len(split.points), 1), split.points)]
@@ -346,7 +346,7 @@ def _check_signal(signal: Signal, n_channels: int, per_frame: int) -> Signal:
     return signal
 
 
-def _residuals(motion: Motion, layout: Layout, parts: list[Signal]) -> Signal:
+def _residuals(motion: Motion, layout: C3dLayout, parts: list[Signal]) -> Signal:
     """The residual words of the points of all ``parts``, one part after the other.
 
     If the motion has none, 0 for valid points and -1 for others.
@@ -391,7 +391,7 @@ def valid_points(signal: Signal) -> NDArray[np.bool_] | None:
     return valid
 
 
-def _words(signal: Signal, layout: Layout, unsigned: bool = False) -> Items:
+def _words(signal: Signal, layout: C3dLayout, unsigned: bool = False) -> Items:
     """The words of a signal, (rows, channels), in the byte order of the file."""
     grids = (*signal.grids, *(grid for _, _, grid in signal.grid_changes))
     kinds = {grid.kind for grid in grids}

@@ -101,7 +101,7 @@ class C3dDetail(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class C3dLayout:
     """A template and a detail, parsed; see C3dTemplate and C3dDetail.
 
     ``head`` here has the fields in place; ``tail`` is all that lies behind the data; ``outputs`` is
@@ -177,7 +177,7 @@ class Layout:
         return build(template, "source template"), build(detail, "source detail")
 
 
-def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
+def parse_layout(source_format: str, template: bytes, detail: bytes) -> C3dLayout:
     """The layout of a clip whose source is ``FORMAT`` or ``OUTPUTS_FORMAT``.
 
     Raises FormatError on bad bytes.
@@ -214,7 +214,7 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
         fields.append((entry.at, kind))
     if n_used != len(own.values) or len(head) != len(shared.head):  # C3D-12
         raise FormatError(f"source detail: {len(own.values)} bytes of fields, not {n_used}")
-    return Layout(
+    return C3dLayout(
         Order(shared.processor),
         shared.word,
         shared.points,

@@ -18,7 +18,7 @@ from mcz.model.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.signal import Scaling
 from mcz.sources.c3d.data_section import field_bytes, valid_points
-from mcz.sources.c3d.layout import Kind, Layout
+from mcz.sources.c3d.layout import C3dLayout, Kind
 from mcz.sources.c3d.parameters import (
     BLOCK,
     FLOAT,
@@ -187,7 +187,7 @@ def _on(signal: Signal, grid: Grid) -> Signal:
 
 def _layout(
     motion: Motion, scale: float | None, section_data: SectionData, shape: tuple[int, int]
-) -> Layout:
+) -> C3dLayout:
     """The layout of the file: header, parameter section, fields."""
     order, n_points = Order(INTEL), len(section_data.names)
     n_channels, subframes = shape
@@ -208,7 +208,7 @@ def _layout(
     head = header + section.data
     for at, kind in fields:
         head[at : at + kind.size] = field_bytes(order, kind, int(first), motion.n_frames, 0)
-    return Layout(
+    return C3dLayout(
         order,
         4 if scale is None else 2,
         n_points,

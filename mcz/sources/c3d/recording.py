@@ -13,7 +13,7 @@ import numpy as np
 
 from mcz.model.motion import Source
 from mcz.model.signal import Scaling
-from mcz.sources.c3d.layout import Layout, parse_layout
+from mcz.sources.c3d.layout import C3dLayout, parse_layout
 from mcz.sources.c3d.parameters import (
     BLOCK,
     FLOAT,
@@ -131,7 +131,7 @@ def parameters_of(source_format: str, template: bytes, detail: bytes) -> Paramet
     return _parameters(parse_layout(source_format, template, detail))
 
 
-def recording_of(layout: Layout) -> Recording:
+def recording_of(layout: C3dLayout) -> Recording:
     """The recording in the header and the parameter section of a file."""
     parameters = _parameters(layout)
     return Recording(
@@ -168,7 +168,7 @@ def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | 
     return replace(source, template=template, detail=detail)
 
 
-def _parameters(layout: Layout) -> Parameters:
+def _parameters(layout: C3dLayout) -> Parameters:
     """The parameter section, which lies before the data or behind it; without one, none."""
     head = layout.head
     none = Parameters(layout.order, 0, {}, 0)

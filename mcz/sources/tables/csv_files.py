@@ -36,7 +36,7 @@ from mcz.sources.tables.signals import read_columns, read_text, table_metadata, 
 from mcz.sources.tables.times import Times, read_times
 from mcz.sources.tables.vicon import AXIS, read_vicon
 from mcz.sources.text.layout import FRAME_NUMBER
-from mcz.sources.text.rows import Rows, line_of, number_frames
+from mcz.sources.text.rows import TokenRows, line_of, number_frames
 from mcz.sources.text.source import (
     BOM,
     check_text,
@@ -217,7 +217,7 @@ def counts_rows(name: str) -> bool:
     return bool(TIME.fullmatch(name) or (name and FRAME.fullmatch(name)) or _CLOCK.search(name))
 
 
-def _check_decimals(data: bytes, rows: Rows, n_values: int, labels: Sequence[str]) -> None:
+def _check_decimals(data: bytes, rows: TokenRows, n_values: int, labels: Sequence[str]) -> None:
     """Refuse texts beside integers alone if nothing counts the rows: a list is no motion."""
     present = rows.stop[:, :n_values] > 0
     start, stop = rows.start[:, :n_values][present], rows.stop[:, :n_values][present]

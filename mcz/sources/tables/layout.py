@@ -31,7 +31,7 @@ from mcz.sources.text.layout import (
     MAX_PATTERNS,
     MAX_RUNS,
     Detail,
-    Layout,
+    FrameLayout,
     PatternFields,
     numbered_patterns,
     parsed_patterns,
@@ -173,7 +173,7 @@ class Section:
     marked: bool
     missing: bytes
     clock: Clock | None
-    rows: Layout
+    rows: FrameLayout
 
 
 def build_table(sections: Sequence[Section]) -> tuple[bytes, bytes]:

@@ -43,7 +43,7 @@ from mcz.sources.tables.signals import (
 )
 from mcz.sources.tables.text_columns import TextColumn, odd_cells, split_text
 from mcz.sources.tables.times import Times, read_times, stated_rate
-from mcz.sources.text.rows import Rows, line_of, number_frames
+from mcz.sources.text.rows import TokenRows, line_of, number_frames
 from mcz.sources.text.source import (
     MOST_JOINTS,
     check_count,
@@ -316,7 +316,7 @@ def write(motion: Motion) -> bytes:
     return restore_table(motion)
 
 
-def _signal(data: bytes, rows: Rows, columns: Sequence[int]) -> Signal:
+def _signal(data: bytes, rows: TokenRows, columns: Sequence[int]) -> Signal:
     return read_signal(data, select_columns(rows, columns))
 
 
@@ -341,7 +341,9 @@ def _joints(header: Header, columns: FrameColumns) -> tuple[tuple[Joint, ...], l
     return joints, odd
 
 
-def _elements(data: bytes, rows: Rows, header: Header, columns: FrameColumns) -> Iterator[Signal]:
+def _elements(
+    data: bytes, rows: TokenRows, header: Header, columns: FrameColumns
+) -> Iterator[Signal]:
     """Signals of the elements that do not belong to the motion."""
     for name in columns.elements:
         signal = _signal(data, rows, columns.columns[name])
@@ -350,7 +352,7 @@ def _elements(data: bytes, rows: Rows, header: Header, columns: FrameColumns) ->
 
 
 def _attributes(
-    data: bytes, rows: Rows, columns: FrameColumns, texts: Mapping[int, TextColumn]
+    data: bytes, rows: TokenRows, columns: FrameColumns, texts: Mapping[int, TextColumn]
 ) -> Iterator[Signal]:
     """A signal for each attribute of numbers."""
     at = columns.first_attribute
@@ -363,8 +365,8 @@ def _attributes(
 
 
 def _split_text(
-    data: bytes, rows: Rows, columns: FrameColumns
-) -> tuple[Rows, dict[int, TextColumn]]:
+    data: bytes, rows: TokenRows, columns: FrameColumns
+) -> tuple[TokenRows, dict[int, TextColumn]]:
     """``rows`` with numbers in place of attributes that are text, and these by their column."""
     places = [columns.column(name) for name in columns.attributes]
     text_cells = odd_cells(data, select_columns(rows, places)).text_columns() if places else []
@@ -376,7 +378,7 @@ def _split_text(
     return rows, dict(zip(chosen, texts, strict=True))
 
 
-def _times(data: bytes, rows: Rows, header: Header, columns: FrameColumns) -> Times:
+def _times(data: bytes, rows: TokenRows, header: Header, columns: FrameColumns) -> Times:
     """The times of the frames in milliseconds, and the rate, which the header states."""
     rate = stated_rate(header.subject.get("frameRate", ""))
     stated = [] if rate is None else [rate]
@@ -387,7 +389,7 @@ def _times(data: bytes, rows: Rows, header: Header, columns: FrameColumns) -> Ti
     return replace(times, rate=rate) if near else times
 
 
-def _are_near(times: Times, rows: Rows, rate: Fraction) -> bool:
+def _are_near(times: Times, rows: TokenRows, rate: Fraction) -> bool:
     """Return True if times that were measured are those of a rate to less than a frame."""
     if not times.signals or times.signals[0].role != TIMES:
         return False

@@ -18,7 +18,7 @@ from mcz.model.text_format import quote
 from mcz.sources.tables.csv_files import MAX_COLUMNS
 from mcz.sources.text import MARKUP
 from mcz.sources.text.layout import FRAME_NUMBER, FRAME_NUMBER_TEXT
-from mcz.sources.text.rows import DENSE, Rows, Token, line_of, read_rows
+from mcz.sources.text.rows import DENSE, Token, TokenRows, line_of, read_rows
 
 POSITION, ORIENTATION = "position", "orientation"
 INDEX, TIME, TYPE = "@index", "@time", "@type"  # @: an attribute of frames
@@ -139,7 +139,7 @@ def first_frame(data: bytes, at: int) -> int:
         at = _BLANKS.match(data, end + len(END)).end()  # type: ignore[union-attr]  # nothing, too
 
 
-def read_frames(data: bytes, at: int) -> tuple[Rows, FrameColumns]:
+def read_frames(data: bytes, at: int) -> tuple[TokenRows, FrameColumns]:
     """Read the frames from offset ``at`` to the end of ``data``; SourceError for anything else."""
     first, _ = _parts(data, at)
     sizes = {name: len(tokens) for name, tokens in first if tokens}
@@ -153,7 +153,7 @@ def read_frames(data: bytes, at: int) -> tuple[Rows, FrameColumns]:
         return _read(data, at, columns_of(sizes, numbered))
 
 
-def _read(data: bytes, at: int, columns: FrameColumns) -> tuple[Rows, FrameColumns]:
+def _read(data: bytes, at: int, columns: FrameColumns) -> tuple[TokenRows, FrameColumns]:
     return read_rows(
         data, at, columns.n_columns, _frames(data, columns), MARKUP, room=DENSE
     ), columns

@@ -32,7 +32,7 @@ from mcz.sources.tables.times import (
     stated_rate,
 )
 from mcz.sources.text.layout import FRAME_NUMBER
-from mcz.sources.text.rows import Rows, line_of, number_frames
+from mcz.sources.text.rows import TokenRows, line_of, number_frames
 from mcz.sources.text.source import (
     check_text,
     named_count,
@@ -135,7 +135,7 @@ def _widest(data: bytes, at: int) -> int:
 
 
 def _trc_times(
-    data: bytes, rows: Rows, column: int, values: dict[str, str]
+    data: bytes, rows: TokenRows, column: int, values: dict[str, str]
 ) -> tuple[Times, list[str]]:
     """The times, and notes on oddities."""
     stated = [

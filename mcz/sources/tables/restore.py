@@ -21,7 +21,7 @@ from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Ints
 from mcz.sources.restore import printed_count, text_limit, write_rows
 from mcz.sources.tables.layout import Clock, Section, build_table, fill_marks, parse_sections
-from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, runs_of
+from mcz.sources.text.layout import FRAME_NUMBER, FrameLayout, Pattern, runs_of
 from mcz.sources.text.source import TableNotes
 
 INTEGERS = Grid(GridKind.FIXED)
@@ -195,7 +195,7 @@ def _with_source(
     """
     clock, times = _times(motion)
     signals = (motion.signals[0], *times)
-    rows = Layout((), (Pattern(runs_of(items), b"\n"),))
+    rows = FrameLayout((), (Pattern(runs_of(items), b"\n"),))
     numbers = tuple(range(len(signals)))
     template, detail = build_table([Section(numbers, header.encode(), True, missing, clock, rows)])
     source = Source(format_name, template, detail)

@@ -22,7 +22,7 @@ from mcz.sources.tables.csv_text import BLANK_CELLS, cell_spans
 from mcz.sources.tables.text_columns import TextColumn, odd_cells, refuse_commas, split_text
 from mcz.sources.text import BLANKS, FREE, FULL
 from mcz.sources.text.layout import FRAME_NUMBER, MAX_WIDTH, Pattern, runs_of
-from mcz.sources.text.rows import DENSE, Rows, Token, line_of, read_rows
+from mcz.sources.text.rows import DENSE, Token, TokenRows, line_of, read_rows
 
 Bools = NDArray[np.bool_]
 
@@ -137,7 +137,7 @@ class TableRows:
     ``texts``: the columns that are text, which ``rows`` have the numbers of.
     """
 
-    rows: Rows
+    rows: TokenRows
     missing: bytes
     texts: tuple[TextColumn, ...] = ()
 
@@ -162,7 +162,7 @@ def read_table(
     if free:  # lines of blank cells at the end are no rows
         data = data[: data.find(b"\n", len(data.rstrip(BLANK_CELLS))) + 1 or len(data)]
 
-    def attempt(blanks: bool) -> Rows:
+    def attempt(blanks: bool) -> TokenRows:
         cells = RowCells(data, columns, separator, blanks, free)
         empty = FREE if free and len(columns) > 1 else BLANKS  # an empty line is no row
         mode = empty if blanks else FULL
@@ -194,7 +194,7 @@ def read_table(
     return TableRows(rows, missing, tuple(text_columns))
 
 
-def append_rest(rows: Rows, rest: bytes) -> Rows:
+def append_rest(rows: TokenRows, rest: bytes) -> TokenRows:
     """``rows`` with what follows the last one."""
     ending = rows.patterns[last_pattern(rows)].tail if rows.ending is None else rows.ending
     return replace(rows, ending=ending + rest) if rest else rows
@@ -221,7 +221,7 @@ def _padded_cells(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
     return {column: width for column, width in widths.items() if 1 < width <= MAX_WIDTH}
 
 
-def _are(data: bytes, rows: Rows, word: bytes) -> Bools:
+def _are(data: bytes, rows: TokenRows, word: bytes) -> Bools:
     """Mask of the tokens equal to ``word``."""
     text = np.frombuffer(data, np.uint8)
     same: Bools = rows.stop - rows.start == len(word)
@@ -230,14 +230,14 @@ def _are(data: bytes, rows: Rows, word: bytes) -> Bools:
     return same
 
 
-def _without(rows: Rows, gone: Bools) -> Rows:
+def _without(rows: TokenRows, gone: Bools) -> TokenRows:
     if not gone.any():
         return rows
     keep = ~gone
     return replace(rows, start=rows.start * keep, stop=rows.stop * keep)
 
 
-def move_zeros_to_gaps(data: bytes, rows: Rows, groups: Sequence[Sequence[int]]) -> Rows:
+def move_zeros_to_gaps(data: bytes, rows: TokenRows, groups: Sequence[Sequence[int]]) -> TokenRows:
     """``rows`` with the zeros that end every number of a group of columns moved to the gaps.
 
     ``%.6f`` of what has 3 decimals prints three zeros that say nothing.
@@ -263,7 +263,7 @@ def move_zeros_to_gaps(data: bytes, rows: Rows, groups: Sequence[Sequence[int]])
     return replace(rows, stop=rows.stop - less, patterns=tuple(moved), ending=ending)
 
 
-def last_pattern(rows: Rows) -> int:
+def last_pattern(rows: TokenRows) -> int:
     """The number of the pattern of the last row."""
     if rows.notes is None or not len(rows.notes.patterns):
         return 0
@@ -296,7 +296,7 @@ def _move_pattern(pattern: Pattern, zeros: dict[int, bytes]) -> Pattern:
     return Pattern(runs_of(items), before + pattern.tail)
 
 
-def _shared_zeros(data: bytes, rows: Rows, columns: Sequence[int]) -> bytes:
+def _shared_zeros(data: bytes, rows: TokenRows, columns: Sequence[int]) -> bytes:
     """The zeros that end all tokens of the columns, with the point if nothing is before them."""
     chosen = list(columns)
     start, stop = rows.start[:, chosen].ravel(), rows.stop[:, chosen].ravel()

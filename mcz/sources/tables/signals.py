@@ -21,7 +21,7 @@ from mcz.model.motion import Channel, Exceptions, Signal
 from mcz.model.numbers import Grid, GridFlag, GridKind, Tokens, bits_of, fit_grid, scan
 from mcz.model.text_format import quote
 from mcz.sources.tables.text_columns import TextColumn
-from mcz.sources.text.rows import Rows, line_of
+from mcz.sources.text.rows import TokenRows, line_of
 
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
@@ -32,7 +32,7 @@ WORTH = 32  # exceptions that a change of grid must save
 RARE = 1 / 200  # exceptions of a column, by its tokens, that are cheaper than a digit more for each
 
 
-def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
+def read_signal(data: bytes, rows: TokenRows, n_each: int = 1) -> Signal:
     """The signal of ``rows``, ``n_each`` a frame; SourceError for a token that is no number.
 
     A token that is absent has mask False and the value of the row before (0 in the first row).
@@ -176,14 +176,14 @@ _TEXT_NOTE = re.compile(r"(?:^|; )[0-9]+ columns? (?:is|are) text: ([^;]*)")
 MOST_TRIED = 2048  # columns; of more each may take long, and has little to gain
 
 
-def select_columns(rows: Rows, columns: Sequence[int]) -> Rows:
+def select_columns(rows: TokenRows, columns: Sequence[int]) -> TokenRows:
     """``rows`` with these columns alone; their layout is not theirs any more."""
     chosen = list(columns)
     start, stop = rows.start[:, chosen], rows.stop[:, chosen]
     return replace(rows, start=np.ascontiguousarray(start), stop=np.ascontiguousarray(stop))
 
 
-def read_columns(data: bytes, rows: Rows, columns: Sequence[int], n_each: int = 1) -> Signal:
+def read_columns(data: bytes, rows: TokenRows, columns: Sequence[int], n_each: int = 1) -> Signal:
     """The signal of these columns, ``n_each`` rows a frame; SourceError for what is no number."""
     rows = select_columns(rows, columns)
     signal = read_signal(data, rows, n_each)
@@ -221,7 +221,11 @@ def read_columns(data: bytes, rows: Rows, columns: Sequence[int], n_each: int = 
 
 
 def read_text(
-    data: bytes, rows: Rows, texts: Sequence[TextColumn], labels: Sequence[str], at: tuple[int, int]
+    data: bytes,
+    rows: TokenRows,
+    texts: Sequence[TextColumn],
+    labels: Sequence[str],
+    at: tuple[int, int],
 ) -> tuple[Signal, ...]:
     """The signal of the numbers in text columns, if there are any.
 
@@ -262,7 +266,7 @@ def table_metadata(encoding: str, notes: Sequence[str]) -> dict[str, str]:
 
 
 def _better(
-    data: bytes, rows: Rows, signal: Signal, column: int
+    data: bytes, rows: TokenRows, signal: Signal, column: int
 ) -> tuple[Grid, list[tuple[int, bytes]]] | None:
     """A grid that suits the column better than that of the signal, with what it does not print."""
     present = np.flatnonzero(rows.stop[:, column])

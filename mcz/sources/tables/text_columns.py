@@ -21,7 +21,7 @@ from mcz.model.numbers import scan
 from mcz.model.types import Bools, Ints
 from mcz.sources.tables.csv_text import DECIMAL_COMMA, NO_NUMBER, check_points
 from mcz.sources.text.layout import MAX_PATTERNS, Pattern, RowNotes, runs_of
-from mcz.sources.text.rows import DENSE, FEW_CELLS, Rows, blanks_beside, line_of
+from mcz.sources.text.rows import DENSE, FEW_CELLS, TokenRows, blanks_beside, line_of
 
 # A column of few texts is stored whole if they seldom change, or if many rows share each.
 FEW_TEXTS = 16
@@ -74,7 +74,7 @@ class OddCells:
         return chosen_columns
 
 
-def odd_cells(data: bytes, rows: Rows) -> OddCells:
+def odd_cells(data: bytes, rows: TokenRows) -> OddCells:
     """The cells of ``rows`` that hold no plain number, and are not blank."""
     present = rows.stop > rows.start
     chosen = slice(None) if present.all() else np.flatnonzero(present)
@@ -110,8 +110,8 @@ class _Shape:
 
 
 def split_text(
-    data: bytes, rows: Rows, columns: Mapping[int, int], at: int
-) -> tuple[Rows, list[TextColumn]]:
+    data: bytes, rows: TokenRows, columns: Mapping[int, int], at: int
+) -> tuple[TokenRows, list[TextColumn]]:
     """``rows`` without the text ``columns``, with number columns inserted before ``at``.
 
     ``columns``: the cell number of each, for messages. Raises SourceError if the texts have too

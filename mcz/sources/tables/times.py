@@ -18,7 +18,7 @@ from mcz.model.numbers import Grid, GridKind, Tokens, scan
 from mcz.model.numbers import decimal_kernels as kernels
 from mcz.sources.tables.layout import Clock
 from mcz.sources.tables.signals import read_columns
-from mcz.sources.text.rows import Rows
+from mcz.sources.text.rows import TokenRows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -275,7 +275,7 @@ def as_times(signal: Signal, channel: Channel) -> tuple[Signal, str]:
 
 def read_times(
     data: bytes,
-    rows: Rows,
+    rows: TokenRows,
     column: int,
     stated: Sequence[Fraction] = (),
     unit: Fraction = SECOND,

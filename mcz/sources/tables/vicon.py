@@ -29,7 +29,7 @@ from mcz.sources.tables.rows import (
 from mcz.sources.tables.signals import TEXT, read_columns, read_text, table_metadata, text_note
 from mcz.sources.tables.times import stated_rate
 from mcz.sources.text.layout import FRAME_NUMBER
-from mcz.sources.text.rows import Rows, line_of, number_frames
+from mcz.sources.text.rows import TokenRows, line_of, number_frames
 from mcz.sources.text.source import names_in, section_of, table_source, text_encoding
 
 Ints = NDArray[np.int64]
@@ -74,7 +74,7 @@ class _Read:
 
     part: _Part
     table: TableRows
-    rows: Rows
+    rows: TokenRows
     numbers: Ints
     n_each: int
     spare: bool

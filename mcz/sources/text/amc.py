@@ -20,8 +20,8 @@ from mcz.model.text_format import quote
 from mcz.sources.restore import restore
 from mcz.sources.tables.signals import read_signal
 from mcz.sources.text.bones import fit_skeleton, flat_skeleton, match_bones, match_names
-from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, RowNotes, runs_of
-from mcz.sources.text.rows import Rows, Token, line_of, number_frames, read_rows, tail_end
+from mcz.sources.text.layout import FRAME_NUMBER, FrameLayout, Pattern, RowNotes, runs_of
+from mcz.sources.text.rows import Token, TokenRows, line_of, number_frames, read_rows, tail_end
 from mcz.sources.text.source import (
     Arriving,
     Frame,
@@ -81,7 +81,7 @@ def read(data: bytes, name: str = "motion", skeleton: Skeleton | None = None) ->
 
 def _read_frames(
     data: bytes, begin: int, skeleton: Skeleton | None, frames: _Frames, encoding: str
-) -> tuple[Skeleton, Rows]:
+) -> tuple[Skeleton, TokenRows]:
     """The skeleton that fits the bones, and all frames."""
     counts = {bone.decode(encoding): count for bone, count in frames.counts.items()}
     if len(counts) < len(frames.counts):
@@ -345,7 +345,7 @@ def _plain_source(motion: Motion) -> Source:
 
 def _source(unit: str, patterns: tuple[Pattern, ...], notes: RowNotes | None) -> Source:
     header = f":FULLY-SPECIFIED\n:{unit}\n".encode()
-    template, detail = Layout((header,), patterns).build()
+    template, detail = FrameLayout((header,), patterns).build()
     return Source("amc", template, detail, notes)
 
 

@@ -20,7 +20,7 @@ from mcz.sources.restore import restore
 from mcz.sources.tables.signals import read_signal
 from mcz.sources.tables.times import frame_rate, frame_time
 from mcz.sources.text.hierarchy import read_hierarchy, write_hierarchy
-from mcz.sources.text.layout import Layout, Pattern, runs_of
+from mcz.sources.text.layout import FrameLayout, Pattern, runs_of
 from mcz.sources.text.rows import Token, line_of, read_rows, tail_end
 from mcz.sources.text.source import Arriving, Frame, Lines, check_text, source_of, text_encoding
 
@@ -215,5 +215,5 @@ def _plain_source(motion: Motion) -> Source:
     runs = runs_of([(b" " if k else b"", column, 0) for k, column in enumerate(columns)])
     time = frame_time(motion.frame_rate)
     header = (text + "MOTION\nFrames: ").encode(), f"\nFrame Time: {time}\n".encode()
-    template, detail = Layout(header, (Pattern(runs, b"\n"),)).build()
+    template, detail = FrameLayout(header, (Pattern(runs, b"\n"),)).build()
     return Source("bvh", template, detail)

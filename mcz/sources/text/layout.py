@@ -145,7 +145,7 @@ def runs_of(items: Iterable[tuple[bytes, int, int]]) -> tuple[Run, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class FrameLayout:
     """A template and a detail, parsed: see Template and Detail; ``ending`` None: the usual tail."""
 
     header: tuple[bytes, ...]
@@ -207,7 +207,7 @@ def _pattern_fields(pattern: Pattern, gaps: dict[bytes, int]) -> PatternFields:
     return PatternFields(runs=runs, tail=gaps.setdefault(pattern.tail, len(gaps)))
 
 
-def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
+def parse_layout(template: bytes, detail: bytes, n_channels: int) -> FrameLayout:
     """The layout of a clip of ``n_channels`` channels; raises FormatError on bad bytes."""
     shared = parse(Template, template, "source template", {"runs": MAX_RUNS})
     own = parse(Detail, detail, "source detail", {"runs": MAX_RUNS})
@@ -216,7 +216,9 @@ def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
     return parsed_patterns(tuple(shared.header), shared, own, n_channels)
 
 
-def parsed_patterns(header: tuple[bytes, ...], shared: Any, own: Any, n_channels: int) -> Layout:
+def parsed_patterns(
+    header: tuple[bytes, ...], shared: Any, own: Any, n_channels: int
+) -> FrameLayout:
     """The layout of the fields of a template and of a detail; raises FormatError."""
     if len(shared.patterns) > 1:  # SRC-04
         raise FormatError(f"source template: {len(shared.patterns)} patterns (0 or 1)")
@@ -232,7 +234,7 @@ def parsed_patterns(header: tuple[bytes, ...], shared: Any, own: Any, n_channels
         for number, fields in enumerate([*shared.patterns, *own.patterns])
     ]
     ending = own.ending if own.ends else None
-    return Layout(header, tuple(patterns), own.count, own.rows, ending)
+    return FrameLayout(header, tuple(patterns), own.count, own.rows, ending)
 
 
 def _pattern(fields: Any, gaps: Sequence[bytes], n_channels: int, where: str) -> Pattern:

@@ -54,7 +54,7 @@ def tail_end(data: bytes, at: int) -> int:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class TokenRows:
     """All frames: ``start`` and ``stop`` (n_rows, n_columns) of each token, 0 if it is absent.
 
     ``patterns`` come with the most common one first; ``numbers`` are the frame numbers, None if
@@ -74,7 +74,7 @@ class Rows:
         return len(self.start)
 
 
-def number_frames(rows: Rows, n_each: int = 1) -> Rows:
+def number_frames(rows: TokenRows, n_each: int = 1) -> TokenRows:
     """``rows``, ``n_each`` a frame, with numbers that ascend from frame to frame.
 
     If those of the file do not, they count from the first by 1, and the notes have its texts.
@@ -99,7 +99,7 @@ def read_rows(
     cells: int = WORDS,
     widths: dict[int, int] | None = None,
     room: int = SPARSE,
-) -> Rows:
+) -> TokenRows:
     """Read all frames of ``data`` from offset ``at`` on; ``widths``: of columns known to be padded.
 
     ``cells``: what a token is, as ``text_kernels.match_rows`` has it. ``room``: how many cells
@@ -144,7 +144,7 @@ class _Reader:
     number_texts: list[tuple[int, bytes]] = field(default_factory=list)
     samples: list[tuple[int, list[Token], int]] = field(default_factory=list)
 
-    def read(self, at: int) -> Rows:
+    def read(self, at: int) -> TokenRows:
         text = np.frombuffer(self.data, np.uint8)
         begin, last_end = at, at
         self._allocate(min(64, self._most_rows()))
@@ -263,7 +263,7 @@ class _Reader:
         if token != b"%d" % number:
             self.number_texts.append((self.row, token))
 
-    def _finish(self, last_end: int) -> Rows:
+    def _finish(self, last_end: int) -> TokenRows:
         """The rows read, with the most common pattern first."""
         n_rows = self.row
         counts: Counter[int] = Counter()
@@ -279,7 +279,7 @@ class _Reader:
         numbered = numbered and not np.array_equal(numbers, np.arange(1, n_rows + 1))
         ending = self.data[last_end:]
         usual = self.patterns[self.used[-1][1]].tail if n_rows else b""
-        return Rows(
+        return TokenRows(
             self.start[:n_rows],
             self.stop[:n_rows],
             tuple(self.patterns[number] for number in order),

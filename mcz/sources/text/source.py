@@ -31,14 +31,14 @@ from mcz.sources.tables.layout import (
     with_phrases,
 )
 from mcz.sources.text.layout import (
-    Layout,
+    FrameLayout,
     NumberText,
     PatternRun,
     RowNotes,
     checked_runs,
     checked_texts,
 )
-from mcz.sources.text.rows import Rows
+from mcz.sources.text.rows import TokenRows
 
 BOM = b"\xef\xbb\xbf"  # U+FEFF in UTF-8: it may stand at the start of a file, and says nothing
 OTHERS = {  # how files of other encodings begin, longer marks first
@@ -98,11 +98,11 @@ def check_first_line(data: bytes, ignored: tuple[bytes, ...]) -> None:
 
 
 def source_of(
-    format_name: str, data: bytes, header: tuple[bytes, ...], rows: Rows, count: bytes = b""
+    format_name: str, data: bytes, header: tuple[bytes, ...], rows: TokenRows, count: bytes = b""
 ) -> Source:
     """The source of a file that was read as ``header`` and ``rows``; ``count``: as printed."""
     usual = count in (b"", b"%d" % rows.n_rows)
-    layout = Layout(
+    layout = FrameLayout(
         header, rows.patterns, b"" if usual else count, 0 if usual else rows.n_rows, rows.ending
     )
     template, detail = layout.build()
@@ -206,7 +206,7 @@ def named_count(data: bytes, at: int, stop: int, count: tuple[int, int], n_rows:
 def section_of(
     header: tuple[bytes, bytes],
     beside: tuple[bytes, Clock | None],
-    rows: Rows,
+    rows: TokenRows,
     names: Sequence[str],
     signals: Sequence[int],
 ) -> Section:
@@ -222,12 +222,12 @@ def section_of(
         marked if fits else whole,
         fits,
         *beside,
-        Layout((), rows.patterns, ending=rows.ending),
+        FrameLayout((), rows.patterns, ending=rows.ending),
     )
 
 
 def table_source(
-    format_name: str, data: bytes, sections: Sequence[tuple[Section, Rows, int]]
+    format_name: str, data: bytes, sections: Sequence[tuple[Section, TokenRows, int]]
 ) -> Source:
     """The source of a table of sections, each with its rows, so many a frame."""
     template, detail = build_table([section for section, _, _ in sections])

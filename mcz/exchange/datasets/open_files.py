@@ -16,7 +16,15 @@ import numpy as np
 from mcz.container.caches import DecodedCache, SharedCache
 from mcz.errors import OptionError
 from mcz.exchange.datasets.field_table import SIGNAL, parse_fields, subject_of
-from mcz.exchange.datasets.fields import WHOLE, Arrays, Field, Rows, Subject, Units, features_of
+from mcz.exchange.datasets.fields import (
+    WHOLE,
+    Arrays,
+    Field,
+    Subject,
+    SubjectRows,
+    Units,
+    features_of,
+)
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.kinematics.chain import Floats
@@ -92,7 +100,7 @@ def recipe_of(names: str | Iterable[str], *facts: Any) -> Recipe:
     return Recipe(parse_fields(names), *facts)
 
 
-class Sources:
+class OpenFiles:
     """Files by target, opened when they are needed; ``given`` are open already and stay so.
 
     ``runs_bytes`` bounds what all of them keep of decoded frames. Threads may share it.
@@ -187,7 +195,7 @@ def _close(files: OrderedDict[str, File]) -> None:
 
 def _rows(
     recipe: Recipe, subject: Subject, clip: Clip, member: Member, span: tuple[int, int]
-) -> Rows:
+) -> SubjectRows:
     """The frames low <= f < high at the rate of the data set."""
     low, high = span
     steps = _steps(recipe, clip, member, low, high)
@@ -195,7 +203,7 @@ def _rows(
         frames = member.first + low, member.first + high
         signals = {n: _signal_values(clip, subject, n, frames) for n in subject.signals}
         values = _joint_values(clip, subject, frames) if recipe.is_of_joints else None
-        return Rows(_or_none(values, high - low), steps, signals)
+        return SubjectRows(_or_none(values, high - low), steps, signals)
 
     times = _times(recipe, clip, member, range(low, high))
     first, last = int(times.before[0]), int(times.after[-1]) + 1
@@ -209,12 +217,12 @@ def _rows(
             raise OptionError(f"signal {name!r} has several samples a frame; leave rate= out")
         signals[name] = resample_rows(None, _signal_values(clip, subject, name, frames), times)
     if not recipe.is_of_joints:
-        return Rows(_or_none(None, high - low), steps, signals)
+        return SubjectRows(_or_none(None, high - low), steps, signals)
     old = _joint_values(clip, subject, frames)
     new = resample_rows(clip.skeleton, old, times)
     if times.share.any():
         turn_scalars(scalar_quaternions(clip.skeleton, None, old), old, new, times)
-    return Rows(new, steps, signals)
+    return SubjectRows(new, steps, signals)
 
 
 def _or_none(values: Floats | None, n_frames: int) -> Floats:
