@@ -22,7 +22,7 @@ from mcz.bench.cases import Case, Variant, find_cases, load, preset_of, variants
 from mcz.bench.measure import DialRange, cpu_seconds, ladder, measure, peak_bytes, speeds
 from mcz.bench.report import bench
 from mcz.bench.sweep import bd_rate, bd_sqnr
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from mcz.bench.tasks import KINDS, Runner, Task, perform
 from mcz.cli.common import run as run_command
 from mcz.codecs.parameters import Dial
@@ -293,7 +293,7 @@ def test_errors_are_one_line(samples: Path, tmp_path: Path, capsys: Any) -> None
 
 
 def test_tables_escape_and_leave_out() -> None:
-    table = Table("t", "c", (("a|b", ""), ("n", ".1f")), [("x", None), ("y", 2.0)])
+    table = ResultTable("t", "c", (("a|b", ""), ("n", ".1f")), [("x", None), ("y", 2.0)])
     assert list(table.markdown())[4:8] == [
         *("| a\\|b | n |", "| --- | ---: |", "| x | - |", "| y | 2.0 |")
     ]

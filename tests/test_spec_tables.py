@@ -22,7 +22,7 @@ from mcz.model.numbers import Grid, GridFlag, GridKind, printed_base, rules, val
 from mcz.model.schema import parse
 from mcz.sources import FORMATS
 from mcz.sources.c3d import data_section
-from mcz.sources.c3d.layout import Kind
+from mcz.sources.c3d.layout import FieldKind
 from mcz.sources.tables import opensim
 from mcz.sources.tables.layout import PHRASES, TableTemplate
 from mcz.sources.text import amc
@@ -321,7 +321,7 @@ def test_worked_example_of_a_table() -> None:
 
 def test_fields_of_c3d() -> None:
     rows = table_after(section("Template and detail of C3D"), "| kind | size | content |")
-    assert [(int(row[0]), int(row[1])) for row in rows] == [(kind, kind.size) for kind in Kind]
+    assert [(int(row[0]), int(row[1])) for row in rows] == [(kind, kind.size) for kind in FieldKind]
     assert f"a block has {data_section.BLOCK} bytes" in rows[-1][2]
 
 

@@ -15,7 +15,7 @@ import mcz
 from mcz.bench import peers, sweep
 from mcz.bench.cases import cases_by_names, find_cases, variants_of
 from mcz.bench.sweep import ClipResult, Curve
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from mcz.bench.tasks import Runner
 from mcz.model.types import JsonObject
 from mcz.show.pictures.canvases import THEMES, Theme, theme_of
@@ -198,11 +198,11 @@ def _label_points(axes: Axes, curve: Curve, key: str, published: bool) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class BenchResult:
     """Outcome of a run: clips that were swept, tables, plots and remarks."""
 
     clips: list[ClipResult] = field(default_factory=list)
-    tables: list[Table] = field(default_factory=list)
+    tables: list[ResultTable] = field(default_factory=list)
     figures: list[Figures] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -249,13 +249,13 @@ def bench(
     with_peers: bool = False,
     speeds: bool = True,
     unit: str | None = None,
-) -> Outcome:
+) -> BenchResult:
     """Measure the clips of ``paths``; raises OptionError for an unknown codec or no clip at all."""
     variants = variants_of(codecs)
     cases = cases_by_names(find_cases(paths, unit))
     peer_names = peers.installed_peers() if with_peers else ()
     clips = sweep.measure_all(runner, cases, variants, speeds=speeds, peers=peer_names)
-    outcome = Outcome(clips, figures=[partial(draw, clips)])
+    outcome = BenchResult(clips, figures=[partial(draw, clips)])
     for clip in clips:
         outcome.tables.extend(sweep.tables(clip))
         outcome.notes.extend(

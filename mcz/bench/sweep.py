@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.bench.cases import Case, Variant, load
 from mcz.bench.measure import N_POINTS, Record
-from mcz.bench.tables import Table, setting
+from mcz.bench.tables import ResultTable, setting
 from mcz.bench.tasks import Runner, Task
 from mcz.codecs import codec_by_name
 from mcz.model.types import JsonObject
@@ -234,7 +234,7 @@ def _curve(variant: Variant, swept: Any, speeds: Any) -> Curve:
     return Curve(variant.label, tuple(swept), variant, {} if error else speeds, error)
 
 
-def tables(clip: ClipResult) -> Iterator[Table]:
+def tables(clip: ClipResult) -> Iterator[ResultTable]:
     yield _points(clip)
     if clip.lossy:
         yield from _at_equal(clip)
@@ -260,7 +260,7 @@ NUMERATORS = (
 )
 
 
-def _points(clip: ClipResult) -> Table:
+def _points(clip: ClipResult) -> ResultTable:
     unit = clip.unit
     columns = (
         *(("codec", ""), ("setting", ""), ("bytes", ",d"), ("cr_source", ".2f")),
@@ -273,7 +273,7 @@ def _points(clip: ClipResult) -> Table:
         f"max: position error of the joints' points in {unit}; markers: of three virtual markers "
         "a joint."
     )
-    table = Table(f"{clip.name}: points", caption, columns)
+    table = ResultTable(f"{clip.name}: points", caption, columns)
     keys = (
         *("coded_bytes", "cr_source", "cr_float32", "cr_40B", "mse"),
         *(clip.error_key, clip.error_key.replace("mean", "max")),
@@ -312,12 +312,14 @@ def _front(curve: Curve, key: str) -> tuple[Any, Any]:
 BETWEEN = "interpolated between measured points, in logarithms; - where the codec does not reach it"
 
 
-def _at_equal(clip: ClipResult) -> Iterator[Table]:
+def _at_equal(clip: ClipResult) -> Iterator[ResultTable]:
     yield _at_error(clip, "position error", clip.error_key, AT_ERRORS, clip.unit)
     yield _at_error(clip, "MSE", "mse", AT_MSES, "")
     caption = f"{_about(clip)}. {clip.error_key} in {clip.unit} at cr_source of, {BETWEEN}."
     heads = tuple((f"CR {value:g}", ".4f") for value in AT_RATIOS)
-    table = Table(f"{clip.name}: position error at equal size", caption, (("codec", ""), *heads))
+    table = ResultTable(
+        f"{clip.name}: position error at equal size", caption, (("codec", ""), *heads)
+    )
     for curve in clip.plotted_curves:
         sizes = (clip.source_bytes / ratio for ratio in AT_RATIOS)
         errors = (at_size(curve, clip.error_key, size) for size in sizes)
@@ -325,18 +327,20 @@ def _at_equal(clip: ClipResult) -> Iterator[Table]:
     yield table
 
 
-def _at_error(clip: ClipResult, title: str, key: str, errors: Sequence[float], unit: str) -> Table:
+def _at_error(
+    clip: ClipResult, title: str, key: str, errors: Sequence[float], unit: str
+) -> ResultTable:
     where = f"{key} in {unit}" if unit else key
     caption = f"{_about(clip)}. cr_source at {where} of, {BETWEEN}."
     heads = tuple((f"{value:g} {unit}".strip(), ".1f") for value in errors)
-    table = Table(f"{clip.name}: CR at equal {title}", caption, (("codec", ""), *heads))
+    table = ResultTable(f"{clip.name}: CR at equal {title}", caption, (("codec", ""), *heads))
     for curve in clip.plotted_curves:
         sizes = (at_error(curve, key, value) for value in errors)
         table.rows.append((curve.label, *(clip.source_bytes / s if s else None for s in sizes)))
     return table
 
 
-def _delta_tables(clip: ClipResult) -> Iterator[Table]:
+def _delta_tables(clip: ClipResult) -> Iterator[ResultTable]:
     deltas = {(d["reference"], d["other"]): d for d in clip.deltas()}
     labels = [curve.label for curve in clip.lossy]
     for title, key, unit in (
@@ -345,14 +349,14 @@ def _delta_tables(clip: ClipResult) -> Iterator[Table]:
     ):
         caption = f"{_about(clip)}. The codec of the row against that of the column, in {unit}."
         heads = tuple((label, ".2f") for label in labels)
-        table = Table(f"{clip.name}: {title}", caption, (("codec", ""), *heads))
+        table = ResultTable(f"{clip.name}: {title}", caption, (("codec", ""), *heads))
         for row in labels:
             cells = (deltas.get((column, row), {}).get(key) for column in labels)
             table.rows.append((row, *cells))
         yield table
 
 
-def _speeds(clip: ClipResult) -> Table:
+def _speeds(clip: ClipResult) -> ResultTable:
     names = ("encode", "decode", "write", "read")
     columns = (
         *(("codec", ""), ("setting", "")),
@@ -366,7 +370,7 @@ def _speeds(clip: ClipResult) -> Table:
         "read: a whole file in memory with all its hashes. / parse: as a ratio to parsing the "
         "source file in the same run. Peak: memory of the codec alone, beside the values."
     )
-    table = Table(f"{clip.name}: speed and memory", caption, columns)
+    table = ResultTable(f"{clip.name}: speed and memory", caption, columns)
     for curve in clip.curves:
         if speeds := curve.speeds:
             rates = (speeds[f"{name}_fps"] for name in names)
@@ -376,7 +380,7 @@ def _speeds(clip: ClipResult) -> Table:
     return table
 
 
-def _peers(clip: ClipResult) -> Table:
+def _peers(clip: ClipResult) -> ResultTable:
     columns = (
         *(("peer", ""), ("what is coded", ""), ("bytes", ",d"), ("cr_source", ".2f")),
         *(("cr_float32", ".2f"), ("cr_40B", ".2f"), (f"mean {clip.unit}", ".4f")),
@@ -387,7 +391,7 @@ def _peers(clip: ClipResult) -> Table:
         "names or spelling. Rotations are unwrapped in it. GB/s: 8 bytes a value of the clip in a "
         "second of CPU time; of mcz, from opening the file to checked values."
     )
-    table = Table(f"{clip.name}: peers", caption, columns)
+    table = ResultTable(f"{clip.name}: peers", caption, columns)
     for curve in clip.curves:
         if curve.lossless and curve.points:
             point = curve.points[0]

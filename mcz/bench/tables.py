@@ -11,7 +11,7 @@ Cell = float | int | str | None
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ResultTable:
     """Rows of raw values; the caption has clip, numerator, metric and unit.
 
     ``columns`` are pairs of heading and format; a format is as for ``format()``, "" for text.
@@ -37,7 +37,7 @@ class Table:
         return self.document() | {"columns": [list(pair) for pair in self.columns]}
 
     @classmethod
-    def from_cache(cls, cached: JsonObject) -> Table:
+    def from_cache(cls, cached: JsonObject) -> ResultTable:
         """The inverse of ``to_cache``."""
         columns = tuple((head, spec) for head, spec in cached["columns"])
         return cls(cached["title"], cached["caption"], columns, cached["rows"])

@@ -68,7 +68,7 @@ def _peers(task: Task) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class TaskKind:
     """A kind of task; ``alone``: no other task runs at the same time.
 
     ``work`` is a function of a module, since other processes get it by name.
@@ -78,15 +78,15 @@ class Kind:
     alone: bool = False
 
 
-KINDS: Mapping[str, Kind] = {
-    "sweep": Kind(_sweep),  # n_points
-    "point": Kind(_point),  # pairs of parameter and value
-    "speeds": Kind(_speeds, alone=True),  # pairs of parameter and value
-    "peers": Kind(_peers, alone=True),  # names of the installed ones
+KINDS: Mapping[str, TaskKind] = {
+    "sweep": TaskKind(_sweep),  # n_points
+    "point": TaskKind(_point),  # pairs of parameter and value
+    "speeds": TaskKind(_speeds, alone=True),  # pairs of parameter and value
+    "peers": TaskKind(_peers, alone=True),  # names of the installed ones
 }
 
 
-def perform(task: Task, kind: Kind) -> Any:
+def perform(task: Task, kind: TaskKind) -> Any:
     """The result of a task; ``{"error": ...}`` if the clip or a parameter is refused."""
     try:
         with warnings.catch_warnings():
@@ -136,7 +136,7 @@ class Runner:
         self,
         jobs: int,
         cache: Cache,
-        kinds: Mapping[str, Kind] = KINDS,
+        kinds: Mapping[str, TaskKind] = KINDS,
         progress: Progress | None = None,
     ) -> None:
         self.jobs, self.cache, self.kinds = jobs, cache, kinds

@@ -28,7 +28,7 @@ from mcz.errors import reason_of
 from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.bench.report import Outcome
+    from mcz.bench.report import BenchResult
     from mcz.codecs.contract import Codec
     from mcz.model.motion import Motion
 
@@ -294,7 +294,7 @@ def bench_command(
     return Exit.FINE
 
 
-def show(outcome: Outcome, out: Path | None, *, as_json: bool) -> None:
+def show(outcome: BenchResult, out: Path | None, *, as_json: bool) -> None:
     """Print the results, and write the files of a report if ``out`` is given."""
     document = outcome.document() | {"files": _write(outcome, out) if out else []}
     if as_json:
@@ -315,7 +315,7 @@ def _sample(folder: str) -> str:
     return str(Path(folder) / "walk.amc")
 
 
-def _lines(outcome: Outcome) -> Iterator[str]:
+def _lines(outcome: BenchResult) -> Iterator[str]:
     for report in outcome.tables:
         yield report.title
         yield from (f"  {line}" for line in table(report.cells(), report.right))
@@ -323,7 +323,7 @@ def _lines(outcome: Outcome) -> Iterator[str]:
         yield ""
 
 
-def _write(outcome: Outcome, folder: Path) -> list[str]:
+def _write(outcome: BenchResult, folder: Path) -> list[str]:
     from mcz.bench.report import MISSING, can_draw, draw_all
 
     try:

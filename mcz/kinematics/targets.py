@@ -26,7 +26,7 @@ TYPICAL_LEVER = 0.125  # of the reach: a turn by one radian counts as a move by 
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class JointTarget:
     """A position of ``joint``: its tail of that number or, -1, its origin; ``axis`` of a marker."""
 
     joint: int
@@ -44,11 +44,13 @@ class Targets:
     def __init__(self, skeleton: Skeleton, *, markers: bool) -> None:
         self.skeleton, self.chain = skeleton, Chain(skeleton)
         own = points_of(skeleton)
-        self.list = [Target(joint, tail) for joint, tails in enumerate(own) for tail in tails]
+        self.list = [JointTarget(joint, tail) for joint, tails in enumerate(own) for tail in tails]
         self.distance = marker_distance(skeleton) if markers else 0.0
         if markers:
             firsts = [tails[0] for tails in own]
-            self.list += [Target(j, tail, k) for j, tail in enumerate(firsts) for k in range(3)]
+            self.list += [
+                JointTarget(j, tail, k) for j, tail in enumerate(firsts) for k in range(3)
+            ]
         self.lever = TYPICAL_LEVER * reach(skeleton) or 1.0
         self.units = self._units()
         self.below = self._below()
@@ -151,9 +153,9 @@ class Targets:
                 yield column, some, axes[:, component] * (vector[component] / self.lever)
 
     @staticmethod
-    def _targets_by_tail(joint: int, link: Link) -> Iterator[tuple[int, set[Target]]]:
+    def _targets_by_tail(joint: int, link: Link) -> Iterator[tuple[int, set[JointTarget]]]:
         for tail in range(len(link.tails)):
-            yield tail, {Target(joint, tail, axis) for axis in (-1, 0, 1, 2)}
+            yield tail, {JointTarget(joint, tail, axis) for axis in (-1, 0, 1, 2)}
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

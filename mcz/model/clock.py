@@ -233,14 +233,16 @@ def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
     return timeline
 
 
-class Numbered(NamedTuple):
+class FrameNumbering(NamedTuple):
     """Frame numbers, and the time of the first frame, None if the numbers imply it."""
 
     numbers: Ints
     first_time: float | None
 
 
-def numbering_of(timeline: Timeline, numbers: Ints, *, strict: bool = False) -> Numbered | None:
+def numbering_of(
+    timeline: Timeline, numbers: Ints, *, strict: bool = False
+) -> FrameNumbering | None:
     """Frame numbers for the times of ``timeline`` at its rate, without a column.
 
     ``numbers`` are kept if they can be, with ``strict`` always. None if frame numbers
@@ -264,7 +266,7 @@ def numbering_of(timeline: Timeline, numbers: Ints, *, strict: bool = False) -> 
         for start in (None, int(known[0]) / float(rate), float(times[0])):
             candidate = timeline_of(Counting(known, rate), start)
             if candidate is not None and np.abs(candidate.times - times).max() <= tolerance:
-                return Numbered(known, start)
+                return FrameNumbering(known, start)
     return None
 
 

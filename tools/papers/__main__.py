@@ -18,7 +18,7 @@ from tools.papers.khan2014.run import khan2014
 from tools.papers.khan2016.run import khan2016
 from tools.papers.kinds import CODE, KINDS
 from tools.papers.kwak.run import kwak
-from tools.papers.outcome import Outcome
+from tools.papers.outcome import BenchResult
 
 PAPERS = {"khan2014": khan2014, "khan2016": khan2016, "hou2016": hou2016, "kwak": kwak}
 
@@ -58,7 +58,7 @@ def command(
     runner = Runner(
         jobs or os.cpu_count() or 1, Cache(default_folder() if cache else None, CODE), KINDS
     )
-    outcome = Outcome()
+    outcome = BenchResult()
     with Progress() as progress, errors_about(clips[0]):
         runner.progress = progress
         for name in PAPERS if paper == "all" else (paper,):

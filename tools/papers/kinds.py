@@ -8,7 +8,7 @@ from typing import Any
 
 from mcz.bench import tasks
 from mcz.bench.cases import Variant
-from mcz.bench.tasks import Kind, Task
+from mcz.bench.tasks import Task, TaskKind
 from tools.papers import curves
 from tools.papers.at_figure import at_figure
 from tools.papers.hou2016 import spatial, ways_back
@@ -68,17 +68,21 @@ def _kwak_speeds(task: Task) -> Any:
     return kwak.speeds(task.case, *task.arguments)
 
 
-KINDS: Mapping[str, Kind] = {
+KINDS: Mapping[str, TaskKind] = {
     **tasks.KINDS,
-    "at": Kind(_at),  # metric, wanted, where to begin
-    "deflated": Kind(_measure_deflated),  # threshold
-    "resolutions": Kind(_resolutions),  # joint, pairs of parameter and value
-    "curve": Kind(_curve),  # bases as text, if any
-    "bases": Kind(_bases),  # clips, pairs of a recipe
-    "convergence": Kind(_convergence),  # clips, iterations, every so many frames
-    "spatial": Kind(_spatial),  # clips, pairs of name and bases as text
-    "speeds_beside": Kind(_speeds_beside, alone=True),  # triples of codec, its parameters, setting
-    "way_back": Kind(_way_back),  # step in cm, whether with virtual markers
-    "kwak": Kind(_kwak),  # what, form of the clip, what it says
-    "kwak_speeds": Kind(_kwak_speeds, alone=True),  # form, triples of codec, its parameters, more
+    "at": TaskKind(_at),  # metric, wanted, where to begin
+    "deflated": TaskKind(_measure_deflated),  # threshold
+    "resolutions": TaskKind(_resolutions),  # joint, pairs of parameter and value
+    "curve": TaskKind(_curve),  # bases as text, if any
+    "bases": TaskKind(_bases),  # clips, pairs of a recipe
+    "convergence": TaskKind(_convergence),  # clips, iterations, every so many frames
+    "spatial": TaskKind(_spatial),  # clips, pairs of name and bases as text
+    "speeds_beside": TaskKind(
+        _speeds_beside, alone=True
+    ),  # triples of codec, its parameters, setting
+    "way_back": TaskKind(_way_back),  # step in cm, whether with virtual markers
+    "kwak": TaskKind(_kwak),  # what, form of the clip, what it says
+    "kwak_speeds": TaskKind(
+        _kwak_speeds, alone=True
+    ),  # form, triples of codec, its parameters, more
 }

@@ -7,13 +7,13 @@ from functools import partial
 from typing import Any
 
 from mcz.bench.cases import Case, find_cases
-from mcz.bench.report import Outcome
-from mcz.bench.tables import Table
+from mcz.bench.report import BenchResult
+from mcz.bench.tables import ResultTable
 from mcz.bench.tasks import Task
 from mcz.errors import OptionError
 from tools.papers.panels import Panels, draw
 
-__all__ = ["Outcome", "absent", "add", "cases_by_name", "cases_of", "without"]
+__all__ = ["BenchResult", "absent", "add", "cases_by_name", "cases_of", "without"]
 
 
 def cases_by_name(paths: Sequence[str], unit: str | None) -> dict[str, Case]:
@@ -22,7 +22,7 @@ def cases_by_name(paths: Sequence[str], unit: str | None) -> dict[str, Case]:
 
 
 def cases_of(
-    outcome: Outcome, paper: str, names: Sequence[str], found: Mapping[str, Case]
+    outcome: BenchResult, paper: str, names: Sequence[str], found: Mapping[str, Case]
 ) -> dict[str, Case]:
     """A paper's clips in its order; raises OptionError where none is here."""
     cases = {name: found[name] for name in names if name in found}
@@ -32,14 +32,14 @@ def cases_of(
     return cases
 
 
-def absent(outcome: Outcome, paper: str, names: Sequence[str], here: Iterable[str]) -> None:
+def absent(outcome: BenchResult, paper: str, names: Sequence[str], here: Iterable[str]) -> None:
     """Say which clips of a paper are not ``here``."""
     known = set(here)
     if left := [name for name in names if name not in known]:
         outcome.notes.append(f"{paper}: clips that are not here: {', '.join(left)}")
 
 
-def without(outcome: Outcome, paper: str, codecs: Sequence[str]) -> None:
+def without(outcome: BenchResult, paper: str, codecs: Sequence[str]) -> None:
     """Say which codecs are not here."""
     if codecs:
         left = ", ".join(codecs)
@@ -47,8 +47,8 @@ def without(outcome: Outcome, paper: str, codecs: Sequence[str]) -> None:
 
 
 def add(
-    outcome: Outcome,
-    tables: Iterable[Table],
+    outcome: BenchResult,
+    tables: Iterable[ResultTable],
     results: Mapping[Task, Any],
     panels: Iterable[Panels] = (),
 ) -> None:

@@ -30,7 +30,7 @@ from mcz.files.reading.file import File, open
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.poses.conversions import scalar_quaternions
 from mcz.kinematics.poses.resampling import (
-    Times,
+    FrameTimes,
     frames_within,
     resample_rows,
     times_at,
@@ -249,7 +249,7 @@ def _signal_values(clip: Clip, subject: Subject, name: str, frames: tuple[int, i
     return values
 
 
-def _times(recipe: Recipe, clip: Clip, member: Member, frames: range) -> Times:
+def _times(recipe: Recipe, clip: Clip, member: Member, frames: range) -> FrameTimes:
     """The places of frames of the data set among the frames of the clip."""
     if member.is_even:
         return times_at(frames, recipe.step(member))

@@ -24,7 +24,7 @@ from mcz.model.types import JsonObject, Params
 from mcz.sources import FORMATS, arrays_of, format_by_id
 
 if TYPE_CHECKING:
-    from mcz.sources.c3d.parameters import Parameter, Parameters
+    from mcz.sources.c3d.parameters import C3dParameter, Parameters
     from mcz.sources.c3d.recording import Event
 
 RESTORED = "restored"  # the file whose SHA-256 is stored, byte for byte
@@ -263,7 +263,7 @@ def _parameters(motion: Motion) -> dict[tuple[str, str], Any]:
     }
 
 
-def _value(parameters: Parameters, parameter: Parameter) -> Any:
+def _value(parameters: Parameters, parameter: C3dParameter) -> Any:
     from mcz.sources.c3d.parameters import TEXT
 
     if parameter.type == TEXT:

@@ -24,10 +24,10 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.sizes import clip_sizes
 from mcz.files.writing.clip_writer import Trial, with_values, write_trial
 from mcz.files.writing.planning import MEAN_ERROR, Prepared
-from mcz.kinematics import positions_of
 from mcz.kinematics.joint_names import find_joints
 from mcz.kinematics.metrics import Comparison, compare
 from mcz.kinematics.metrics.sums import channel_errors
+from mcz.kinematics.points import positions_of
 from mcz.model.motion import Motion
 from mcz.model.types import Floats, JsonObject, Params
 

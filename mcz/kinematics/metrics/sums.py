@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mcz.kinematics import point_names, point_set
 from mcz.kinematics.angles import without_turns, without_whole_turns
+from mcz.kinematics.points import point_names, point_set
 from mcz.model.motion import Channel, Signal, Skeleton
 from mcz.model.types import Bools, Floats, Settings
 

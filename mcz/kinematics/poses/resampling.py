@@ -28,7 +28,7 @@ MOST_VALUES = 2**31  # limit of the result: a rate of 1e9 is a mistake
 
 
 @dataclass(frozen=True, slots=True)
-class Times:
+class FrameTimes:
     """The new frames between the old: frame ``before`` and the next, and the share between, 0 to 1.
 
     ``before`` int64 (n,), ``share`` float64 (n,): 0 where a new frame coincides with an old one.
@@ -109,14 +109,14 @@ def resample(
     return resampled_motion.at_times(Timeline(new, new_rate, timeline.rounding))
 
 
-def times_of(timeline: Timeline, rate: Fraction, signal: Signal) -> tuple[Ints, Times]:
+def times_of(timeline: Timeline, rate: Fraction, signal: Signal) -> tuple[Ints, FrameTimes]:
     """The frames at ``rate`` within the runs of ``timeline``, and their places.
 
     Counted from 0 at its first time, in exact arithmetic if times lie at whole multiples of 1 /
     rate. Raises OptionError if they would be too many.
     """
     room = MOST_VALUES // max(1, signal.n_channels)
-    parts: list[tuple[Ints, Times]] = []
+    parts: list[tuple[Ints, FrameTimes]] = []
     for run in timeline.runs:
         frames, lie = frames_within(timeline, rate, run)
         room -= max(0, frames.stop - frames.start)  # too many for len()
@@ -124,14 +124,14 @@ def times_of(timeline: Timeline, rate: Fraction, signal: Signal) -> tuple[Ints, 
             raise too_many_frames_error(timeline, rate)
         parts.append((np.array(frames, np.int64), lie(frames)))
     if not parts:
-        return np.empty(0, np.int64), Times(np.empty(0, np.int64), np.empty(0))
+        return np.empty(0, np.int64), FrameTimes(np.empty(0, np.int64), np.empty(0))
     numbers, places = zip(*parts, strict=True)
     if len(parts) == 1:
         return numbers[0], places[0]
     ends = np.array(timeline.runs, np.int64) - [0, 1]
     half = [np.full((2, len(n)), 0.5) for n in numbers]
     weights = [h if f.weights is None else f.weights for f, h in zip(places, half, strict=True)]
-    times = Times(
+    times = FrameTimes(
         np.concatenate([each.before for each in places]),
         np.concatenate([each.share for each in places]),
         np.repeat(ends, [len(each) for each in numbers], axis=0),
@@ -150,7 +150,7 @@ def too_many_frames_error(timeline: Timeline, rate: Fraction) -> OptionError:
 
 def frames_within(
     timeline: Timeline, new_rate: Fraction, run: tuple[int, int]
-) -> tuple[range, Callable[[range], Times]]:
+) -> tuple[range, Callable[[range], FrameTimes]]:
     """New frames within a run of old ones, and a function that locates them."""
     start, stop = run
     places, rate = timeline.ticks, timeline.rate
@@ -163,11 +163,11 @@ def frames_within(
     return frames, lambda frames: _locate_frames(np.array(frames, np.float64), since, start)
 
 
-def _shift_times(times: Times, by: int) -> Times:
-    return Times(times.before + by, times.share)
+def _shift_times(times: FrameTimes, by: int) -> FrameTimes:
+    return FrameTimes(times.before + by, times.share)
 
 
-def _locate_frames(frames: Floats, since: Floats, start: int) -> Times:
+def _locate_frames(frames: Floats, since: Floats, start: int) -> FrameTimes:
     """The places of ``frames`` among old ones at ``since``, rising, from frame ``start`` on."""
     before = np.clip(np.searchsorted(since, frames, side="right") - 1, 0, max(0, len(since) - 2))
     after = np.minimum(before + 1, len(since) - 1)
@@ -180,7 +180,7 @@ def _locate_frames(frames: Floats, since: Floats, start: int) -> Times:
     with np.errstate(invalid="ignore"):  # times that are all one
         weights = np.stack([own / (own + steps[before]), own / (own + steps[before + 2])])
     weights = np.nan_to_num(weights, nan=0.5)
-    return Times(before + upon + start, np.where(upon, 0.0, share), weights=weights)
+    return FrameTimes(before + upon + start, np.where(upon, 0.0, share), weights=weights)
 
 
 MOST_FRAMES = 2**28
@@ -196,14 +196,14 @@ def count_resampled_frames(n_frames: int, rate: Fraction, new_rate: Fraction) ->
     return count
 
 
-def times_at(frames: Iterable[int], step: Fraction) -> Times:
+def times_at(frames: Iterable[int], step: Fraction) -> FrameTimes:
     """Times of new frames in old frames, ``step`` apart."""
     places = [divmod(frame * step.numerator, step.denominator) for frame in frames]
     before = np.array([whole for whole, _ in places], np.int64)
-    return Times(before, np.array([rest / step.denominator for _, rest in places]))
+    return FrameTimes(before, np.array([rest / step.denominator for _, rest in places]))
 
 
-def resample_rows(skeleton: Skeleton | None, old: Floats, times: Times) -> Floats:
+def resample_rows(skeleton: Skeleton | None, old: Floats, times: FrameTimes) -> Floats:
     """``resample`` of the rows of ``old``; ``skeleton`` None for channels without a joint."""
     if not times.share.any():
         return old[times.before]
@@ -217,7 +217,9 @@ def resample_rows(skeleton: Skeleton | None, old: Floats, times: Times) -> Float
     return new
 
 
-def turn_scalars(quaternions: Sequence[Quaternion], old: Floats, new: Floats, times: Times) -> None:
+def turn_scalars(
+    quaternions: Sequence[Quaternion], old: Floats, new: Floats, times: FrameTimes
+) -> None:
     """Fill the columns of quaternions among plain scalars in the frames that are between frames."""
     between = np.flatnonzero(times.share > 0)
     before, after, share = times.before[between], times.after[between], times.share[between]
@@ -226,7 +228,7 @@ def turn_scalars(quaternions: Sequence[Quaternion], old: Floats, new: Floats, ti
         new[between, columns] = slerp_quaternions(old[before, columns], old[after, columns], share)
 
 
-def spline_rows(old: Floats, times: Times) -> Floats:
+def spline_rows(old: Floats, times: FrameTimes) -> Floats:
     """Catmull-Rom splines through the rows of ``old``, straight where a neighbor is missing."""
     runs = times.runs
     low, high = (0, len(old) - 1) if runs is None else (runs[:, 0], runs[:, 1])
@@ -250,7 +252,7 @@ def _rows(old: Floats, frames: Ints, low: Ints | int, high: Ints | int) -> Float
     return rows
 
 
-def _turn(chain: Chain, link: Link, old: Floats, new: Floats, times: Times) -> None:
+def _turn(chain: Chain, link: Link, old: Floats, new: Floats, times: FrameTimes) -> None:
     """Fill the columns that turn a joint in the frames between old frames."""
     between = np.flatnonzero(times.share > 0)
     before, after = times.before[between], times.after[between]

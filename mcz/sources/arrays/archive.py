@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from mcz.errors import MczError, SourceError
 from mcz.model.schema import inflate
-from mcz.sources.arrays.layout import SIZES, Kind
+from mcz.sources.arrays.layout import SIZES, PieceKind
 
 LOCAL, CENTRAL, END = b"PK\3\4", b"PK\1\2", b"PK\5\6"
 END64, LOCATOR64, DESCRIPTOR = b"PK\6\6", b"PK\6\7", b"PK\7\x08"
@@ -30,7 +30,7 @@ class ArchiveField:
     """A number at offset ``at`` that follows from the bytes from ``start`` to ``stop``."""
 
     at: int
-    kind: Kind
+    kind: PieceKind
     start: int
     stop: int
 
@@ -107,12 +107,12 @@ def read_archive(data: bytes) -> Archive:
     sums = {
         (f.start, f.stop): zlib.crc32(memoryview(whole)[f.start : f.stop])
         for f in fields
-        if f.kind == Kind.CRC
+        if f.kind == PieceKind.CRC
     }
     true, wrong, written_to = [], set(), 0
     for field in fields:
         width = SIZES[field.kind]
-        is_sum = field.kind == Kind.CRC
+        is_sum = field.kind == PieceKind.CRC
         number = sums[field.start, field.stop] if is_sum else field.stop - field.start
         if field.at >= written_to and _number(data, field.at, width) == number:
             true.append(field)
@@ -282,8 +282,8 @@ def _of_members(data: bytes, members: tuple[ArchiveMember, ...]) -> Iterator[Arc
                 if of is not None:
                     yield ArchiveField(at, _of_width(width), *of)
         if member.contents is not None:
-            yield ArchiveField(member.at + 14, Kind.CRC, *member.contents)
-            yield ArchiveField(member.entry + 16, Kind.CRC, *member.contents)
+            yield ArchiveField(member.at + 14, PieceKind.CRC, *member.contents)
+            yield ArchiveField(member.entry + 16, PieceKind.CRC, *member.contents)
         yield ArchiveField(place[1], _of_width(place[2]), 0, member.at)
         if member.flags & DESCRIBED and member.contents is not None:
             yield from _descriptor(data, member, member.contents)
@@ -291,12 +291,12 @@ def _of_members(data: bytes, members: tuple[ArchiveMember, ...]) -> Iterator[Arc
 
 def _of_directory(data: bytes, start: int, end: int, tail: int) -> Iterator[ArchiveField]:
     """The numbers at the end, at ``tail``, that may follow from a directory."""
-    yield ArchiveField(tail + 12, Kind.SIZE4, start, end)
-    yield ArchiveField(tail + 16, Kind.SIZE4, 0, start)
+    yield ArchiveField(tail + 12, PieceKind.SIZE4, start, end)
+    yield ArchiveField(tail + 16, PieceKind.SIZE4, 0, start)
     if data[end : end + 4] == END64:
-        yield ArchiveField(end + 40, Kind.SIZE8, start, end)
-        yield ArchiveField(end + 48, Kind.SIZE8, 0, start)
-        yield ArchiveField(tail - 12, Kind.SIZE8, 0, end)
+        yield ArchiveField(end + 40, PieceKind.SIZE8, start, end)
+        yield ArchiveField(end + 48, PieceKind.SIZE8, 0, start)
+        yield ArchiveField(tail - 12, PieceKind.SIZE8, 0, end)
 
 
 def _descriptor(
@@ -307,10 +307,10 @@ def _descriptor(
     packed = member.stop - member.start
     wide = _number(data, at + 4, 8) == packed and _number(data, at + 12, 8) == member.size
     width = 8 if wide else 4
-    yield ArchiveField(at, Kind.CRC, *contents)
+    yield ArchiveField(at, PieceKind.CRC, *contents)
     yield ArchiveField(at + 4, _of_width(width), member.start, member.stop)
     yield ArchiveField(at + 4 + width, _of_width(width), *contents)
 
 
-def _of_width(width: int) -> Kind:
-    return Kind.SIZE8 if width == 8 else Kind.SIZE4
+def _of_width(width: int) -> PieceKind:
+    return PieceKind.SIZE8 if width == 8 else PieceKind.SIZE4

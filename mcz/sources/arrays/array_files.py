@@ -22,7 +22,7 @@ from mcz.model.types import Ints
 from mcz.sources.arrays.archive import Archive
 from mcz.sources.arrays.columns import Array, columns_of, npy_array, npz_arrays, signal_of
 from mcz.sources.arrays.deflate import is_kept
-from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Kind, Piece, build_arrays
+from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Piece, PieceKind, build_arrays
 from mcz.sources.arrays.meaning import Meaning, frames_of, meaning_of
 from mcz.sources.arrays.pickles import Pickle, npy_objects, read_pickle, read_tensors
 from mcz.sources.arrays.restore import Placed, pieces_of, restore_arrays
@@ -278,7 +278,9 @@ def _metadata(
     """Metadata of the file: its words, and notes on oddities."""
     notes = [f"{array.name} is {array.kept}" for array in arrays if array.is_loud]
     notes += [f"the CRC-32 of {name} is not that of its bytes" for name in archive.wrong]
-    verbatim = [piece for piece in pieces if piece.kind == Kind.DEFLATE and is_kept(piece.text)]
+    verbatim = [
+        piece for piece in pieces if piece.kind == PieceKind.DEFLATE and is_kept(piece.text)
+    ]
     if verbatim:
         size = sum(len(piece.text) for piece in verbatim)
         notes.append(f"{size} bytes of deflate, not zlib's, are kept as they are")

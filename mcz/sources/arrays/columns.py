@@ -41,7 +41,7 @@ _CLOSE = re.compile(rb"\}" + _BLANKS)
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
+class NpyHead:
     """``start`` is where the numbers of an array begin, of shape ``shape`` and type ``code``.
 
     ``code`` is NumPy's without byte order, such as "f8"; "O" of pickled objects. ``rows_at`` and
@@ -73,32 +73,34 @@ class Head:
         return prod(self.shape) * int(self.code[1:])
 
 
-def read_head(data: bytes, at: int, stop: int) -> Head:
+def read_head(data: bytes, at: int, stop: int) -> NpyHead:
     """The head of the NPY file in data[at:stop]; see ``Head.odd``."""
     if data[at : at + 6] != MAGIC or stop < at + 10:
-        return Head(odd=f"offset {at}: no NPY file, which begins with \\x93NUMPY")
+        return NpyHead(odd=f"offset {at}: no NPY file, which begins with \\x93NUMPY")
     version = data[at + 6], data[at + 7]
     wide = 2 if version == (1, 0) else 4
     if version not in VERSIONS:
-        return Head(odd=f"offset {at + 6}: version {version[0]}.{version[1]} of NPY is not known")
+        return NpyHead(
+            odd=f"offset {at + 6}: version {version[0]}.{version[1]} of NPY is not known"
+        )
     text_at = at + 8 + wide
     size = int.from_bytes(data[at + 8 : text_at], "little")
     if size > MAX_HEAD or text_at + size > stop:
-        return Head(odd=f"offset {at + 8}: a head of {size} bytes is too long")
+        return NpyHead(odd=f"offset {at + 8}: a head of {size} bytes is too long")
     return _parse_header(data[text_at : text_at + size], text_at, stop)
 
 
-def _parse_header(text: bytes, at: int, stop: int) -> Head:
+def _parse_header(text: bytes, at: int, stop: int) -> NpyHead:
     """Parse the text of a header at offset ``at``."""
     items = _items(text)
     if items is None:
-        return Head(
+        return NpyHead(
             odd=f"offset {at}: the head is no plain dictionary of descr, fortran_order and shape"
         )
     descr, order, shape = items[b"descr"], items[b"fortran_order"], items[b"shape"]
     numbers = _NUMBER.findall(shape[1])
     if len(numbers) > MAX_AXES or not all(map(_PLAIN.fullmatch, numbers)):
-        return Head(
+        return NpyHead(
             odd=f"offset {at + shape.start(1)}: the shape {shape[1][:60]!r} is no plain one"
         )
     lengths = tuple(map(int, numbers))
@@ -108,11 +110,11 @@ def _parse_header(text: bytes, at: int, stop: int) -> Head:
     if first is not None:
         rows_at = at + shape.start(1), at + shape.start(1) + first.end()
     end = at + len(text.rstrip(b"\n").rstrip(b" "))
-    head = Head(
+    head = NpyHead(
         at + len(text), lengths, code, byte_order == b">", order[1] == b"True", rows_at, end
     )
     if head.is_number and head.size != stop - head.start:
-        return Head(
+        return NpyHead(
             odd=f"offset {head.start}: {stop - head.start} bytes of numbers, but shape {lengths} "
             f"of {code} has {head.size}"
         )
@@ -157,7 +159,7 @@ def has_rows(data: bytes) -> bool:
     return _type_of(items[b"descr"])[1] in TYPES and len(_NUMBER.findall(items[b"shape"][1])) > 1
 
 
-def refuse_faulty_head(head: Head) -> None:
+def refuse_faulty_head(head: NpyHead) -> None:
     """Raise SourceError if a head has a fault."""
     if head.odd:
         raise SourceError(head.odd)
@@ -187,7 +189,7 @@ SAMPLE = 64  # rows that are looked at before all of a column are
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
+class ArrayColumns:
     """Columns of one array, (rows, columns), binary64 or int64, and the grid of each.
 
     ``ordinals`` are there if values do not say them: of NaNs with other bits than usual.
@@ -198,7 +200,7 @@ class Columns:
     ordinals: NDArray[np.int64] | None = None
 
 
-def words_of(data: bytes, head: Head) -> Items:
+def words_of(data: bytes, head: NpyHead) -> Items:
     """The numbers of an array as they are stored, a row for each index of its first axis."""
     order = ">" if head.big_endian else "<"
     n_words = head.size // int(head.code[1:])
@@ -207,7 +209,7 @@ def words_of(data: bytes, head: Head) -> Items:
     return shaped.reshape(head.shape[0] if head.shape else 1, -1)
 
 
-def file_columns(head: Head) -> NDArray[np.int64]:
+def file_columns(head: NpyHead) -> NDArray[np.int64]:
     """The column of each number of a row, in the order in which the file has them."""
     inner = head.shape[1:]
     columns = np.arange(int(np.prod(inner, dtype=np.int64))).reshape(inner)
@@ -232,22 +234,22 @@ def misfit_reason(words: Items) -> str:
     return ""
 
 
-def columns_of(words: Items) -> Columns:
+def columns_of(words: Items) -> ArrayColumns:
     """The columns of numbers (rows, columns), which grids store bit for bit."""
     if words.dtype.kind != "f":
-        return Columns(words.astype(np.int64), (INTEGER,) * words.shape[1])
+        return ArrayColumns(words.astype(np.int64), (INTEGER,) * words.shape[1])
     with np.errstate(invalid="ignore"):  # of NaNs that signal
         values = np.require(words, np.float64, ("C", "A"))  # members lie at any offset
     grids = (BINARY32,) * words.shape[1] if words.dtype.itemsize < 8 else _grids_of(values)
     nan = np.isnan(values)
     if not nan.any() or words.dtype.itemsize == 2:
-        return Columns(values, grids)
+        return ArrayColumns(values, grids)
     bits = _bits(words)
     if (bits[nan] == NANS[words.dtype.itemsize]).all():
-        return Columns(values, grids)
+        return ArrayColumns(values, grids)
     grid = BINARY32 if words.dtype.itemsize == 4 else BINARY64
     values = np.where(nan, np.nan, values)  # of one NaN, whatever its bits were
-    return Columns(values, (grid,) * len(grids), grid.ordinals_of_bits(bits))
+    return ArrayColumns(values, (grid,) * len(grids), grid.ordinals_of_bits(bits))
 
 
 def _bits(words: Items) -> Items:
@@ -295,7 +297,7 @@ def _decimals(values: NDArray[np.float64], least: int = 0) -> int:
 
 
 def signal_of(
-    parts: list[Columns],
+    parts: list[ArrayColumns],
     name: str = "motion",
     per_frame: int = 1,
     channels: tuple[Channel, ...] | None = None,
@@ -318,7 +320,7 @@ def signal_of(
     )
 
 
-def _ordinals(part: Columns) -> NDArray[np.int64]:
+def _ordinals(part: ArrayColumns) -> NDArray[np.int64]:
     if part.ordinals is not None:
         return part.ordinals
     if part.values.dtype == np.int64:
@@ -340,7 +342,7 @@ class Array:
     """
 
     name: str
-    head: Head
+    head: NpyHead
     stop: int = 0
     kept: str = ""
     words: Items | None = None
@@ -384,18 +386,18 @@ def _member(data: bytes, member: ArchiveMember) -> Array:
     if member.contents is None:
         how = f"deflated, {member.fault}" if member.fault else f"packed by method {member.method}"
         how = "encrypted" if member.is_encrypted else how
-        return Array(name, Head(), kept=how, is_loud=True)
+        return Array(name, NpyHead(), kept=how, is_loud=True)
     start, stop = member.contents
     head = read_head(data, start, stop)
     if head.odd:
         odd = head.odd
         if member.is_deflated:  # offsets count from the beginning of the contents
             odd = f"inflated, {read_head(data[start:stop], 0, stop - start).odd}"
-        return Array(name, Head(), kept=f"no array ({odd})", is_loud=name != member.name)
+        return Array(name, NpyHead(), kept=f"no array ({odd})", is_loud=name != member.name)
     return array_of(name, data, head, stop)
 
 
-def array_of(name: str, data: bytes, head: Head, stop: int) -> Array:
+def array_of(name: str, data: bytes, head: NpyHead, stop: int) -> Array:
     """The array of a head, whose bytes end at ``stop``."""
     if head.code == "O":
         return Array(name, head, stop, "pickled, and not unpickled", is_loud=True)

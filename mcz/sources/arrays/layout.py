@@ -25,7 +25,7 @@ BIG_ENDIAN, BY_COLUMNS = 1, 2  # flags of a DATA piece
 MAX_PIECES, MAX_RUNS = 2**16, 2**18  # of a file
 
 
-class Kind(IntEnum):
+class PieceKind(IntEnum):
     """Kind of a piece of a file."""
 
     TEXT = 0  # bytes that the template has
@@ -42,16 +42,21 @@ class Kind(IntEnum):
     PART = 10  # no bytes: pieces after it are of some of the frames
 
 
-SIZES = {Kind.SIZE1: 1, Kind.CRC: 4, Kind.SIZE4: 4, Kind.SIZE8: 8}  # bytes of these kinds
-OF_PIECES = (*SIZES, Kind.DEFLATE)
-_OF_START = (*OF_PIECES, Kind.PART, Kind.ITEMS)
-_OF_SPAN = (*OF_PIECES, Kind.PART)
-INTEGERS = (Kind.ROWS, Kind.ITEMS)
-_OF_ROWS = (Kind.COUNT, Kind.DATA, *INTEGERS)
-_OF_DETAIL = (Kind.OWN, Kind.DEFLATE)
+SIZES = {
+    PieceKind.SIZE1: 1,
+    PieceKind.CRC: 4,
+    PieceKind.SIZE4: 4,
+    PieceKind.SIZE8: 8,
+}  # bytes of these kinds
+OF_PIECES = (*SIZES, PieceKind.DEFLATE)
+_OF_START = (*OF_PIECES, PieceKind.PART, PieceKind.ITEMS)
+_OF_SPAN = (*OF_PIECES, PieceKind.PART)
+INTEGERS = (PieceKind.ROWS, PieceKind.ITEMS)
+_OF_ROWS = (PieceKind.COUNT, PieceKind.DATA, *INTEGERS)
+_OF_DETAIL = (PieceKind.OWN, PieceKind.DEFLATE)
 
 
-def _if(kinds: Sequence[Kind], item: object) -> IfThenElse:
+def _if(kinds: Sequence[PieceKind], item: object) -> IfThenElse:
     condition = this.kind == int(kinds[0])
     for kind in kinds[1:]:
         condition |= this.kind == int(kind)
@@ -68,25 +73,28 @@ class ArrayRun(Record):
 class ArrayPiece(Record):
     """A piece of an array file."""
 
-    kind: int = field(one_of(Int8ul, tuple(Kind)), "kind of the piece")  # ARRAY-01
-    text: bytes | None = field(_if((Kind.TEXT,), SIZED), "TEXT only: the bytes")
+    kind: int = field(one_of(Int8ul, tuple(PieceKind)), "kind of the piece")  # ARRAY-01
+    text: bytes | None = field(_if((PieceKind.TEXT,), SIZED), "TEXT only: the bytes")
     signal: int | None = field(
         _if(_OF_ROWS, UVARINT), "COUNT, DATA, ROWS and ITEMS only: index of the signal"
     )
-    after: bytes | None = field(_if((Kind.COUNT,), SIZED), "COUNT only: bytes after the number")
+    after: bytes | None = field(
+        _if((PieceKind.COUNT,), SIZED), "COUNT only: bytes after the number"
+    )
     size: int | None = field(
-        _if((Kind.COUNT, *INTEGERS), UVARINT),
+        _if((PieceKind.COUNT, *INTEGERS), UVARINT),
         "COUNT, ROWS and ITEMS only: bytes, those of blanks included",
     )
     type: int | None = field(
-        _if((Kind.DATA,), one_of(Int8ul, tuple(range(len(TYPES))))), "DATA only: type of a number"
+        _if((PieceKind.DATA,), one_of(Int8ul, tuple(range(len(TYPES))))),
+        "DATA only: type of a number",
     )  # ARRAY-02
     flags: int | None = field(
-        _if((Kind.DATA,), one_of(Int8ul, (0, 1, 2, 3))),
+        _if((PieceKind.DATA,), one_of(Int8ul, (0, 1, 2, 3))),
         "DATA only: bit 0: big-endian; 1: column after column",
     )  # ARRAY-04
     runs: list[ArrayRun] | None = field(
-        _if((Kind.DATA,), counted(ArrayRun, kind="runs")), "DATA only: its columns, in order"
+        _if((PieceKind.DATA,), counted(ArrayRun, kind="runs")), "DATA only: its columns, in order"
     )
     start: int | None = field(
         _if(_OF_START, UVARINT),
@@ -120,7 +128,7 @@ class Piece:
     ``part`` are the frame numbers, first and behind the last, that it is of; None: all.
     """
 
-    kind: Kind
+    kind: PieceKind
     text: bytes = b""  # of OWN pieces, too; of a DEFLATE piece its part of the detail
     signal: int = 0
     after: bytes = b""
@@ -184,7 +192,7 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
     pieces, part = [], None
     for row in fields:
         piece = Piece(
-            Kind(row.kind),
+            PieceKind(row.kind),
             next(own) if row.kind in _OF_DETAIL else row.text or b"",
             row.signal or 0,
             row.after or b"",
@@ -196,7 +204,7 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
             row.stop or 0,
             part,
         )
-        if piece.kind == Kind.PART:
+        if piece.kind == PieceKind.PART:
             part = piece.start, piece.stop
             if piece.start > piece.stop:  # ARRAY-33
                 raise FormatError(f"source template: frames {piece.start} to {piece.stop}")
@@ -206,7 +214,7 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
 
 def n_file_pieces(pieces: Sequence[Piece]) -> int:
     """The number of pieces that are the file; the others are the contents of DEFLATE pieces."""
-    return min((p.start for p in pieces if p.kind == Kind.DEFLATE), default=len(pieces))
+    return min((p.start for p in pieces if p.kind == PieceKind.DEFLATE), default=len(pieces))
 
 
 def check_spans(pieces: Sequence[Piece]) -> None:
@@ -216,7 +224,7 @@ def check_spans(pieces: Sequence[Piece]) -> None:
         if piece.kind in OF_PIECES:  # ARRAY-18
             raise FormatError(f"source template: piece {index} of kind {piece.kind} in contents")
     spans = set()
-    checks = [0, *accumulate(piece.kind == Kind.CRC for piece in pieces)]
+    checks = [0, *accumulate(piece.kind == PieceKind.CRC for piece in pieces)]
     for piece in pieces:
         if piece.kind not in OF_PIECES:
             continue
@@ -228,7 +236,7 @@ def check_spans(pieces: Sequence[Piece]) -> None:
             raise FormatError(
                 f"source template: pieces {piece.start} to {piece.stop}, of the file and contents"
             )
-        if piece.kind == Kind.CRC:
+        if piece.kind == PieceKind.CRC:
             if checks[piece.start] != checks[piece.stop]:  # ARRAY-07
                 raise FormatError("source template: a CRC-32 of a CRC-32")
             if piece.start < piece.stop:  # no pieces overlap none
@@ -263,7 +271,7 @@ def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
     starts = [
         index
         for index, piece in enumerate(pieces[:n_file])
-        if piece.kind == Kind.TEXT and piece.text.startswith(LOCAL)
+        if piece.kind == PieceKind.TEXT and piece.text.startswith(LOCAL)
     ]
     return [
         (_name(pieces[start:]), (*own, *_contents(pieces, own)))
@@ -274,7 +282,7 @@ def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
 
 def _contents(pieces: Sequence[Piece], own: Sequence[Piece]) -> Iterator[Piece]:
     for piece in own:
-        if piece.kind == Kind.DEFLATE:
+        if piece.kind == PieceKind.DEFLATE:
             yield from pieces[piece.start : piece.stop]
 
 
@@ -282,7 +290,7 @@ def list_pieces(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> J
     """The array of these pieces, see ``list_arrays``."""
     listed = {"name": name} | dict.fromkeys(("type", "order", "columns", "signal"))
     for piece in pieces:
-        if piece.kind == Kind.DATA:
+        if piece.kind == PieceKind.DATA:
             listed |= {
                 "type": (">" if piece.flags & BIG_ENDIAN else "<") + TYPES[piece.type],
                 "order": "F" if piece.flags & BY_COLUMNS else "C",
@@ -296,7 +304,7 @@ def _name(pieces: Sequence[Piece]) -> str:
     """The name in a local header, which begins with the first of ``pieces``."""
     header = b""
     for piece in pieces:
-        if piece.kind == Kind.TEXT:
+        if piece.kind == PieceKind.TEXT:
             header += piece.text
         elif piece.kind in SIZES:
             header += bytes(SIZES[piece.kind])

@@ -97,7 +97,7 @@ def meaning_of(arrays: Sequence[Array]) -> Meaning:
     return meaning
 
 
-def _add_body(meaning: Meaning, body: Body) -> None:
+def _add_body(meaning: Meaning, body: ArrayBody) -> None:
     meaning.parts.append(ArraySignal("motion", body.words, role="motion"))
     meaning.places |= {index: (0, columns) for index, columns in body.places.items()}
 
@@ -279,7 +279,7 @@ FACES = {"pose_jaw": 66, "jaw_pose": 66, "pose_eye": 69, "leye_pose": 69, "reye_
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class ArrayBody:
     """The motion signal of a body: ``words`` side by side, and where columns of arrays are."""
 
     skeleton: Skeleton
@@ -288,7 +288,7 @@ class Body:
     places: dict[int, Sequence[int]]
 
 
-def body_of(arrays: Sequence[Array]) -> Body | None:
+def body_of(arrays: Sequence[Array]) -> ArrayBody | None:
     """The body that the arrays of a file speak of, None if they do not."""
     named = {
         array.name: index
@@ -313,7 +313,7 @@ def body_of(arrays: Sequence[Array]) -> Body | None:
     if whole is not None:
         repeats |= dict(_repeated_parts(arrays, named, whole, POSITION * len(root)))
     skeleton = skeleton_of(model, moves=bool(root))
-    return Body(skeleton, n_frames, [arrays[k].numbers for k in (*root, *turns)], repeats)
+    return ArrayBody(skeleton, n_frames, [arrays[k].numbers for k in (*root, *turns)], repeats)
 
 
 def _pose_parts(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:

@@ -17,9 +17,9 @@ from mcz.sources.arrays.pickle_values import (
     LITERALS,
     Dict,
     DType,
-    Name,
     Number,
     PickledArray,
+    PickledName,
     Raw,
     Storage,
     Wrapper,
@@ -50,7 +50,9 @@ _MODULES = {
     "collections": ("OrderedDict",),
     "_codecs": ("encode",),
 }
-NAMES = {f"{module}.{name}": Name(name) for module, names in _MODULES.items() for name in names}
+NAMES = {
+    f"{module}.{name}": PickledName(name) for module, names in _MODULES.items() for name in names
+}
 STORAGES = {
     "BoolStorage": "b1",
     "CharStorage": "i1",
@@ -63,8 +65,8 @@ STORAGES = {
     "DoubleStorage": "f8",
     "BFloat16Storage": "bfloat16",
 }
-TENSORS = {f"torch.{name}": Name(name) for name in STORAGES}
-TENSORS["torch._utils._rebuild_tensor_v2"] = Name("_rebuild_tensor_v2")
+TENSORS = {f"torch.{name}": PickledName(name) for name in STORAGES}
+TENSORS["torch._utils._rebuild_tensor_v2"] = PickledName("_rebuild_tensor_v2")
 VIEW = "a view of a storage, or one of several tensors of it"
 
 
@@ -216,10 +218,10 @@ class Machine:
     def call(self) -> None:
         """REDUCE: what the few known functions would make of their arguments."""
         arguments, function = self.pop(), self.pop()
-        if not isinstance(function, Name) or not isinstance(arguments, tuple):
+        if not isinstance(function, PickledName) or not isinstance(arguments, tuple):
             self.refuse("something other than a function is called")
         match function.name, arguments:
-            case "_reconstruct", (Name("ndarray"), *_):
+            case "_reconstruct", (PickledName("ndarray"), *_):
                 result: object = PickledArray()
             case "scalar", (DType() as dtype, Raw() as content):
                 result = PickledArray((), dtype, False, content)
@@ -253,7 +255,9 @@ class Machine:
     def push_storage(self) -> None:
         """BINPERSID: only a storage of torch."""
         match self.pop():
-            case ("storage", Name(name), key, _, items) if self.storages and name in STORAGES:
+            case ("storage", PickledName(name), key, _, items) if (
+                self.storages and name in STORAGES
+            ):
                 content = self.storages.get(self.text_of(key) or "")
                 self.stack.append(Storage(DType(STORAGES[name], self.order), content, items))
             case _:

@@ -68,7 +68,7 @@ class PickledArray:
 
 
 @dataclass(frozen=True, slots=True)
-class Name:
+class PickledName:
     """A name that a pickle may use, without its module."""
 
     name: str

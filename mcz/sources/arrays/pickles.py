@@ -17,15 +17,15 @@ from mcz.errors import SourceError
 from mcz.model.motion import Source
 from mcz.model.types import JsonObject
 from mcz.sources.arrays.archive import Archive, ArchiveField, read_archive
-from mcz.sources.arrays.columns import MAGIC, MAX_TEXT, Array, Head, array_of, read_head
+from mcz.sources.arrays.columns import MAGIC, MAX_TEXT, Array, NpyHead, array_of, read_head
 from mcz.sources.arrays.columns import is_motion as is_array_motion
 from mcz.sources.arrays.layout import (
     INTEGERS,
     LOCAL,
     SIZES,
     TYPES,
-    Kind,
     Piece,
+    PieceKind,
     list_pieces,
     parse_arrays,
 )
@@ -124,7 +124,7 @@ def _read_machine(machine: Machine) -> Pickle:
     reader = _Reader(machine, _clips(machine, root))
     arrays, fields = reader.read(root)
     fields += [
-        ArchiveField(field, Kind.SIZE8, start, stop) for field, start, stop in machine.frames
+        ArchiveField(field, PieceKind.SIZE8, start, stop) for field, start, stop in machine.frames
     ]
     fields.sort(key=lambda field: field.at)
     archive = Archive(data, len(data), fields=tuple(fields))
@@ -244,23 +244,23 @@ class _Reader:
             return
         self._add(array_of(name, self.data, head, raw.stop))
         if raw.count_size:
-            kind = {1: Kind.SIZE1, 4: Kind.SIZE4, 8: Kind.SIZE8}[raw.count_size]
+            kind = {1: PieceKind.SIZE1, 4: PieceKind.SIZE4, 8: PieceKind.SIZE8}[raw.count_size]
             self.fields.append(ArchiveField(raw.start - raw.count_size, kind, raw.start, raw.stop))
 
-    def _head(self, node: PickledArray) -> tuple[Head, str]:
+    def _head(self, node: PickledArray) -> tuple[NpyHead, str]:
         """The head of an array, and the reason why its bytes are not read, if any."""
         dtype, raw, shape = node.dtype, node.content, node.lengths
         if dtype is None or size_of(shape, 1) is None:
-            return Head(), "an array without type or shape"
+            return NpyHead(), "an array without type or shape"
         code, order = dtype.code, dtype.order
         if not isinstance(raw, Raw):
-            return Head(shape=shape), node.fault
+            return NpyHead(shape=shape), node.fault
         if code in TYPES and code[1:] != "1" and order not in ("<", ">"):
-            return Head(shape=shape), "of a byte order that is not stated"
+            return NpyHead(shape=shape), "of a byte order that is not stated"
         rows = node.shape[0] if shape else None
         places = {raw.start} | ({rows.at} if isinstance(rows, Number) else set())
         if (shape and not isinstance(rows, Number)) or places & self.used:
-            return Head(shape=shape), "an array that shares its bytes or its shape with another"
+            return NpyHead(shape=shape), "an array that shares its bytes or its shape with another"
         if code in TYPES and size_of(shape, int(code[1:])) != raw.stop - raw.start:
             raise SourceError(
                 f"{raw.stop - raw.start} bytes of numbers, but shape {shape} of {code} needs "
@@ -272,7 +272,7 @@ class _Reader:
         is_big = order == ">"
         items = node.items
         items_at = (items.at, items.at + items.size) if items is not None else (0, 0)
-        head = Head(raw.start, shape, code, is_big, node.by_columns, rows_at)
+        head = NpyHead(raw.start, shape, code, is_big, node.by_columns, rows_at)
         return replace(head, is_printed=False, items_at=items_at), ""
 
     def _add_words(self, name: str, node: object) -> bool:
@@ -299,7 +299,7 @@ class _Reader:
         if text and len(text) <= LONGEST:
             self._add(_array_of_texts(name, [text], ()))
         elif is_number and abs(number) <= 2**53:
-            self._add(Array(name, Head(), kept="a single number", words=np.array([[number]])))
+            self._add(Array(name, NpyHead(), kept="a single number", words=np.array([[number]])))
         else:
             return
         self.n_facts += 1
@@ -309,12 +309,14 @@ def _array_of_texts(name: str, words: Sequence[str], shape: tuple[int, ...]) -> 
     """The array of texts that NumPy would make; its bytes are no part of the file."""
     longest = max(map(len, words))
     encoded = [word.ljust(longest, "\0").encode("utf-32-le", "surrogatepass") for word in words]
-    return Array(name, Head(code=f"U{longest}", shape=shape), kept="text", text=b"".join(encoded))
+    return Array(
+        name, NpyHead(code=f"U{longest}", shape=shape), kept="text", text=b"".join(encoded)
+    )
 
 
 def npy_objects(data: bytes) -> Pickle | None:
     """The pickle in an NPY file of objects, None of a file of anything else."""
-    head = read_head(data, 0, len(data)) if data.startswith(MAGIC) else Head()
+    head = read_head(data, 0, len(data)) if data.startswith(MAGIC) else NpyHead()
     return read_pickle(data, head.start) if head.code == "O" else None
 
 
@@ -324,7 +326,7 @@ def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
     Names are those in the pickle of no rows that the template makes.
     """
     pieces = parse_arrays(source.template, source.detail)
-    if source.format == "npy" and all(piece.kind != Kind.ROWS for piece in pieces):
+    if source.format == "npy" and all(piece.kind != PieceKind.ROWS for piece in pieces):
         return list_plain(source, signals)
     sizes = [
         piece.size if piece.kind in INTEGERS else SIZES.get(piece.kind, len(piece.text))
@@ -342,7 +344,7 @@ def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
         names = {}  # a template that no pickle made
     listed = []
     for at, piece in zip(starts, pieces, strict=False):
-        if piece.kind == Kind.DATA:
+        if piece.kind == PieceKind.DATA:
             listed.append(list_pieces(names.get(at, ""), [piece], signals))
     placed = {array["name"] for array in listed}
     unplaced = [name for name in names.values() if name not in placed]

@@ -21,7 +21,7 @@ from mcz.model.motion import Motion, Signal
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Ints, Items
 from mcz.sources.arrays.archive import Archive, ArchiveMember
-from mcz.sources.arrays.columns import Head, file_columns
+from mcz.sources.arrays.columns import NpyHead, file_columns
 from mcz.sources.arrays.deflate import describe_stream, restore_stream
 from mcz.sources.arrays.layout import (
     BIG_ENDIAN,
@@ -30,8 +30,8 @@ from mcz.sources.arrays.layout import (
     OF_PIECES,
     SIZES,
     TYPES,
-    Kind,
     Piece,
+    PieceKind,
     check_spans,
     n_file_pieces,
     parse_arrays,
@@ -63,11 +63,11 @@ def restore_arrays(motion: Motion) -> bytes:
     starts = _starts(pieces, stored)
     out = bytearray(starts[-1])
     for piece, at, stop in zip(pieces, starts, starts[1:], strict=False):
-        if piece.kind != Kind.CRC:
+        if piece.kind != PieceKind.CRC:
             out[at:stop] = _bytes(piece, stored, starts)
     known: dict[tuple[int, int], bytes] = {}
     for piece, at in zip(pieces, starts, strict=False):
-        if piece.kind == Kind.CRC:  # ARRAY-15
+        if piece.kind == PieceKind.CRC:  # ARRAY-15
             span = starts[piece.start], starts[piece.stop]
             if span not in known:
                 known[span] = zlib.crc32(memoryview(out)[slice(*span)]).to_bytes(4, "little")
@@ -119,7 +119,7 @@ def _deflated(pieces: Sequence[Piece], stored: _Stored) -> Sequence[Piece]:
     _starts(pieces, stored)
     return [
         replace(piece, text=restore_stream(piece.text, _contents(piece, pieces, stored)))
-        if piece.kind == Kind.DEFLATE
+        if piece.kind == PieceKind.DEFLATE
         else piece
         for piece in pieces
     ]
@@ -132,14 +132,14 @@ def _contents(piece: Piece, pieces: Sequence[Piece], stored: _Stored) -> bytes:
 def _size(piece: Piece, stored: _Stored) -> int:
     """The bytes of a piece; raises FormatError if it does not fit the signals."""
     match piece.kind:
-        case Kind.TEXT | Kind.OWN | Kind.DEFLATE:
+        case PieceKind.TEXT | PieceKind.OWN | PieceKind.DEFLATE:
             return len(piece.text)
-        case Kind.COUNT | Kind.ROWS | Kind.ITEMS:
+        case PieceKind.COUNT | PieceKind.ROWS | PieceKind.ITEMS:
             stored.signal(piece)
             if piece.kind in INTEGERS and piece.size not in ROW_SIZES:  # ARRAY-30
                 raise FormatError(f"source template: rows in {piece.size} bytes")
             return piece.size
-        case Kind.DATA:
+        case PieceKind.DATA:
             signal = stored.signal(piece)
             if any(first + n > signal.n_channels for first, n in piece.runs):  # ARRAY-10
                 raise FormatError(
@@ -159,16 +159,16 @@ def _bytes(piece: Piece, stored: _Stored, starts: Sequence[int]) -> Any:
             raise FormatError(f"source template: a size of {number} in {size} bytes")
         return number.to_bytes(8, "little")[:size]
     if piece.kind in INTEGERS:
-        number = len(stored.rows(piece)) * (piece.start if piece.kind == Kind.ITEMS else 1)
+        number = len(stored.rows(piece)) * (piece.start if piece.kind == PieceKind.ITEMS else 1)
         if number >= 2 ** (8 * piece.size - (piece.size == 4)):  # ARRAY-31
             raise FormatError(f"source template: {number} in {piece.size} bytes")
         return number.to_bytes(8, "little")[: piece.size]
-    if piece.kind == Kind.COUNT:  # ARRAY-13
+    if piece.kind == PieceKind.COUNT:  # ARRAY-13
         text = b"%d" % len(stored.rows(piece)) + piece.after
         if len(text) > piece.size:  # ARRAY-11
             raise FormatError(f"source template: {len(text)} bytes of a count, not {piece.size}")
         return text.ljust(piece.size)
-    if piece.kind == Kind.DATA:
+    if piece.kind == PieceKind.DATA:
         return _words(piece, stored)
     return piece.text
 
@@ -244,7 +244,7 @@ class Placed:
     ``part`` are the frame numbers of its rows, see ``Piece``.
     """
 
-    head: Head
+    head: NpyHead
     signal: int
     channels: Sequence[int]
     part: tuple[int, int] | None = None
@@ -260,7 +260,7 @@ def pieces_of(
         spans += _of_array(data, array)
     for start, stop in unread:
         if stop - start <= MAX_OWN:
-            spans.append((start, stop, Piece(Kind.OWN, data[start:stop])))
+            spans.append((start, stop, Piece(PieceKind.OWN, data[start:stop])))
     for field in archive.fields:
         piece = Piece(field.kind, start=field.start, stop=field.stop)
         spans.append((field.at, field.at + SIZES[field.kind], piece))
@@ -285,7 +285,7 @@ def _of_stream(data: bytes, member: ArchiveMember) -> tuple[int, int, Piece]:
     assert member.contents is not None
     start, stop = member.contents
     part = describe_stream(data[member.start : member.stop], data[start:stop])
-    return member.start, member.stop, Piece(Kind.DEFLATE, part, start=start, stop=stop)
+    return member.start, member.stop, Piece(PieceKind.DEFLATE, part, start=start, stop=stop)
 
 
 def _cut_pieces(
@@ -298,16 +298,16 @@ def _cut_pieces(
     starts: list[int] = []
     pieces: list[Piece] = []
     at, part = 0, None
-    for start, stop, piece in (*spans, (len(data), len(data), Piece(Kind.TEXT))):
+    for start, stop, piece in (*spans, (len(data), len(data), Piece(PieceKind.TEXT))):
         inner = cuts[bisect_left(cuts, at + 1) : bisect_left(cuts, start)]
         for low, high in zip((at, *inner), (*inner, start), strict=True):
             if low < high:
                 starts.append(low)
-                pieces.append(Piece(Kind.TEXT, data[low:high]))
+                pieces.append(Piece(PieceKind.TEXT, data[low:high]))
         if piece.part is not None and piece.part != part:
             part = piece.part
             starts.append(start)
-            pieces.append(Piece(Kind.PART, start=part[0], stop=part[1]))
+            pieces.append(Piece(PieceKind.PART, start=part[0], stop=part[1]))
         if start < stop:
             starts.append(start)
             pieces.append(piece)
@@ -319,18 +319,18 @@ def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
     """The counts in the head of an array, and its numbers."""
     head = array.head
     low, high = head.rows_at
-    count = Piece(Kind.ROWS, signal=array.signal, size=high - low, part=array.part)
+    count = Piece(PieceKind.ROWS, signal=array.signal, size=high - low, part=array.part)
     if head.is_printed:
         high = head.end
         while high < head.start and data[high : high + 1] == b" ":
             high += 1
         after = data[head.rows_at[1] : head.end]
-        count = replace(count, kind=Kind.COUNT, after=after, size=high - low)
+        count = replace(count, kind=PieceKind.COUNT, after=after, size=high - low)
     flags = BIG_ENDIAN * head.big_endian + BY_COLUMNS * head.by_columns
     order = file_columns(head)
     channels = [array.channels[column] for column in order.tolist()]
     numbers = Piece(
-        Kind.DATA,
+        PieceKind.DATA,
         signal=array.signal,
         type=TYPES.index(head.code),
         flags=flags,
@@ -339,7 +339,7 @@ def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
     )
     low_items, high_items = head.items_at
     factor = len(channels)
-    items = replace(count, kind=Kind.ITEMS, size=high_items - low_items, start=factor)
+    items = replace(count, kind=PieceKind.ITEMS, size=high_items - low_items, start=factor)
     spans = [(low, high, count), (head.start, head.start + head.size, numbers)]
     return [*spans, (low_items, high_items, items)] if high_items else spans
 

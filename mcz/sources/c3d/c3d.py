@@ -19,8 +19,8 @@ from mcz.model.numbers import Grid, GridKind
 from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.model.signal import Scaling
 from mcz.model.types import Items, Values
-from mcz.sources.c3d.data_section import Shape, find_shape, restore_c3d
-from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT, C3dLayout, Kind, ordered_fields
+from mcz.sources.c3d.data_section import DataShape, find_shape, restore_c3d
+from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT, C3dLayout, FieldKind, ordered_fields
 from mcz.sources.c3d.parameters import (
     FLOAT,
     INTEGER,
@@ -43,13 +43,13 @@ from mcz.sources.c3d.recording import is_unsigned, recording_of
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54}
 POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)
 FIELDS = (  # parameters that follow the number of frames: group, name, type, size, kind
-    ("POINT", "FRAMES", INTEGER, 2, Kind.COUNT),
-    ("POINT", "FRAMES", FLOAT, 4, Kind.COUNT_FLOAT),
-    ("POINT", "LONG_FRAMES", INTEGER, 2, Kind.COUNT),
-    ("POINT", "LONG_FRAMES", FLOAT, 4, Kind.COUNT_FLOAT),
-    ("TRIAL", "ACTUAL_START_FIELD", INTEGER, 4, Kind.FIRST_LONG),
-    ("TRIAL", "ACTUAL_END_FIELD", INTEGER, 4, Kind.LAST_LONG),
-    ("ROTATION", "DATA_START", INTEGER, 2, Kind.ROTATIONS),
+    ("POINT", "FRAMES", INTEGER, 2, FieldKind.COUNT),
+    ("POINT", "FRAMES", FLOAT, 4, FieldKind.COUNT_FLOAT),
+    ("POINT", "LONG_FRAMES", INTEGER, 2, FieldKind.COUNT),
+    ("POINT", "LONG_FRAMES", FLOAT, 4, FieldKind.COUNT_FLOAT),
+    ("TRIAL", "ACTUAL_START_FIELD", INTEGER, 4, FieldKind.FIRST_LONG),
+    ("TRIAL", "ACTUAL_END_FIELD", INTEGER, 4, FieldKind.LAST_LONG),
+    ("ROTATION", "DATA_START", INTEGER, 2, FieldKind.ROTATIONS),
 )
 
 
@@ -128,7 +128,7 @@ def _scale(data: bytes, parameters: Parameters) -> tuple[float, str]:
     return 1.0, "no scale that can be used: coordinates are the integers of the file"
 
 
-def _words(data: bytes, parameters: Parameters, shape: Shape) -> Items:
+def _words(data: bytes, parameters: Parameters, shape: DataShape) -> Items:
     """The data section, a row a frame."""
     kind = "i2" if shape.word == 2 else "u4"
     n_words = shape.n_frames * shape.frame_words
@@ -137,7 +137,12 @@ def _words(data: bytes, parameters: Parameters, shape: Shape) -> Items:
 
 
 def _point_signals(
-    data: bytes, parameters: Parameters, shape: Shape, grid: Grid, names: list[str], split: Split
+    data: bytes,
+    parameters: Parameters,
+    shape: DataShape,
+    grid: Grid,
+    names: list[str],
+    split: Split,
 ) -> list[Signal]:
     """Points, residuals, outputs; ``grid`` is that of integer coordinates.
 
@@ -166,7 +171,7 @@ def _columns(points: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _other_signals(
-    data: bytes, parameters: Parameters, shape: Shape, scaling: Scaling | None
+    data: bytes, parameters: Parameters, shape: DataShape, scaling: Scaling | None
 ) -> list[Signal]:
     """Analog samples, whose words mean what ``scaling`` says, and rotations."""
     order, raw, signals = parameters.order, Grid(GridKind.INTEGER), []
@@ -219,7 +224,7 @@ def _mask_points(points: Signal, residuals: Values) -> Signal:
     return points if valid.all() else replace(points, mask=np.repeat(valid, 3, axis=1))
 
 
-def _channels(parameters: Parameters, shape: Shape) -> tuple[Channel, ...]:
+def _channels(parameters: Parameters, shape: DataShape) -> tuple[Channel, ...]:
     """The analog channels. Names and units that are no UTF-8 are read as Latin-1."""
     labels, _ = decode_texts(parameters.texts("ANALOG", "LABELS"))
     units, _ = decode_texts(parameters.texts("ANALOG", "UNITS"))
@@ -228,7 +233,7 @@ def _channels(parameters: Parameters, shape: Shape) -> tuple[Channel, ...]:
     return tuple(Channel("", name, unit) for name, unit in zip(names, units, strict=False))
 
 
-def _rotation_channels(parameters: Parameters, shape: Shape) -> tuple[Channel, ...]:
+def _rotation_channels(parameters: Parameters, shape: DataShape) -> tuple[Channel, ...]:
     """Channels of every rotation: its matrix column by column, and its reliability."""
     labels, _ = decode_texts(parameters.texts("ROTATION", "LABELS"))
     elements = [f"m{row}{column}" for column in range(1, 5) for row in range(1, 5)]
@@ -238,12 +243,12 @@ def _rotation_channels(parameters: Parameters, shape: Shape) -> tuple[Channel, .
     return tuple(Channel("", f"{name} {part}") for name in names for part in parts)
 
 
-def _layout(data: bytes, parameters: Parameters, shape: Shape, split: Split) -> C3dLayout:
+def _layout(data: bytes, parameters: Parameters, shape: DataShape, split: Split) -> C3dLayout:
     """All that lies around the data, and which fields count frames."""
-    fields = [(WORD_OF_FIRST, Kind.FIRST), (WORD_OF_LAST, Kind.LAST)]
+    fields = [(WORD_OF_FIRST, FieldKind.FIRST), (WORD_OF_LAST, FieldKind.LAST)]
     for group, name, type_, size, kind in FIELDS:
         parameter = parameters.get(group, name)
-        is_needed = kind != Kind.ROTATIONS or shape.n_rotations
+        is_needed = kind != FieldKind.ROTATIONS or shape.n_rotations
         if parameter and is_needed and (parameter.type, len(parameter.data)) == (type_, size):
             fields.append((parameter.at, kind))
     gap, tail = b"", data[shape.stop :]

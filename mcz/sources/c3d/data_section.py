@@ -22,7 +22,7 @@ from mcz.errors import FormatError, MotionError, SourceError
 from mcz.model.motion import Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Items, Values
-from mcz.sources.c3d.layout import C3dLayout, Kind, parse_layout
+from mcz.sources.c3d.layout import C3dLayout, FieldKind, parse_layout
 from mcz.sources.c3d.parameters import (
     BLOCK,
     MAX_COUNT,
@@ -31,7 +31,7 @@ from mcz.sources.c3d.parameters import (
     WORD_OF_FIRST,
     WORD_OF_LAST,
     WORD_OF_START,
-    Order,
+    ByteOrder,
     Parameters,
 )
 
@@ -39,7 +39,7 @@ MAX_EMPTY_SIZE = 2**16  # bytes of a frame, if the file has none and is smaller 
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class DataShape:
     """The data section: ``n_frames`` frames of points (4 words each), then samples of analog."""
 
     start: int
@@ -72,7 +72,7 @@ class Shape:
         return self.n_rotations * self.ratio * ROTATION_WORDS * 4
 
 
-def find_shape(data: bytes, parameters: Parameters) -> Shape:
+def find_shape(data: bytes, parameters: Parameters) -> DataShape:
     """The shape of the data section; raises SourceError if there is none."""
     order = parameters.order
     counts = list(_counts(data, parameters))
@@ -107,7 +107,7 @@ def _counts(data: bytes, parameters: Parameters) -> Iterator[int]:
         yield end + 1 - begin
 
 
-def _candidates(data: bytes, parameters: Parameters) -> Iterator[Shape]:
+def _candidates(data: bytes, parameters: Parameters) -> Iterator[DataShape]:
     """Every shape that is declared, the header's first."""
     order = parameters.order
     stated = (order.integer(data, 2), parameters.count("POINT", "USED"))
@@ -124,7 +124,7 @@ def _candidates(data: bytes, parameters: Parameters) -> Iterator[Shape]:
         )
     starts = starts or [len(data)]
     for start, word, n_points, (n, subframes) in product(starts, words or (2, 4), points, analogs):
-        yield Shape(start, word, n_points, n, subframes)
+        yield DataShape(start, word, n_points, n, subframes)
 
 
 def _analogs(data: bytes, parameters: Parameters) -> Iterator[tuple[int, int]]:
@@ -148,7 +148,9 @@ def _analogs(data: bytes, parameters: Parameters) -> Iterator[tuple[int, int]]:
         yield samples, 1
 
 
-def _fit(data: bytes, shape: Shape, counts: list[int], parameters: Parameters) -> tuple[int, bool]:
+def _fit(
+    data: bytes, shape: DataShape, counts: list[int], parameters: Parameters
+) -> tuple[int, bool]:
     """Number of frames, and True if it is declared and fills the section."""
     if not shape.frame_size:
         return (counts[0] if counts else 0), True
@@ -179,7 +181,7 @@ def _first(data: bytes, parameters: Parameters) -> int:
     return first
 
 
-def _with_rotations(data: bytes, shape: Shape, parameters: Parameters) -> Shape:
+def _with_rotations(data: bytes, shape: DataShape, parameters: Parameters) -> DataShape:
     """The shape with the rotations that ROTATION declares, if all of them are there."""
     used, block, ratio = (
         parameters.count("ROTATION", name) for name in ("USED", "DATA_START", "RATIO")
@@ -196,7 +198,7 @@ def _with_rotations(data: bytes, shape: Shape, parameters: Parameters) -> Shape:
 
 
 def _notes(
-    data: bytes, shape: Shape, counts: list[int], parameters: Parameters, order: Order
+    data: bytes, shape: DataShape, counts: list[int], parameters: Parameters, order: ByteOrder
 ) -> Iterator[str]:
     """Notes on oddities of the file."""
     if shape.n_frames > MAX_COUNT:  # a word that stays at its end says what it can
@@ -259,7 +261,7 @@ def _head(motion: Motion, layout: C3dLayout, size: int) -> bytes:
     head = bytearray(layout.head)
     rotations_at = len(head) + size + len(_padding(len(head) + size))
     for at, kind in layout.fields:
-        if kind != Kind.ROTATIONS or not whole:
+        if kind != FieldKind.ROTATIONS or not whole:
             value = field_bytes(layout.order, kind, first, motion.n_frames, rotations_at)
             head[at : at + kind.size] = value
     return bytes(head)
@@ -270,22 +272,24 @@ def _padding(size: int) -> bytes:
     return bytes(-size % BLOCK)
 
 
-def field_bytes(order: Order, kind: Kind, first: int, n_frames: int, rotations_at: int) -> bytes:
+def field_bytes(
+    order: ByteOrder, kind: FieldKind, first: int, n_frames: int, rotations_at: int
+) -> bytes:
     """The bytes of a field if ``n_frames`` frames from number ``first`` on are there."""
     last = first + n_frames - 1  # C3D-15
     match kind:
-        case Kind.COUNT_FLOAT:
+        case FieldKind.COUNT_FLOAT:
             return order.build_real(n_frames)
-        case Kind.FIRST_LONG | Kind.LAST_LONG:
-            number = min(max(0, first if kind == Kind.FIRST_LONG else last), 2**32 - 1)
+        case FieldKind.FIRST_LONG | FieldKind.LAST_LONG:
+            number = min(max(0, first if kind == FieldKind.FIRST_LONG else last), 2**32 - 1)
             return order.build_integer(number & MAX_COUNT) + order.build_integer(number >> 16)
-        case Kind.COUNT:
+        case FieldKind.COUNT:
             number = n_frames
-        case Kind.FIRST:
+        case FieldKind.FIRST:
             number = first
-        case Kind.LAST:
+        case FieldKind.LAST:
             number = last
-        case Kind.ROTATIONS:
+        case FieldKind.ROTATIONS:
             number = rotations_at // BLOCK + 1
     return order.build_integer(min(max(0, number), MAX_COUNT))
 

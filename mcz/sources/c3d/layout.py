@@ -20,7 +20,7 @@ from mcz.sources.c3d.parameters import (
     MAX_COUNT,
     ROTATION_WORDS,
     SGI,
-    Order,
+    ByteOrder,
     Split,
     split_of,
 )
@@ -30,7 +30,7 @@ MAX_ZEROS = 2**20  # that a detail counts instead of holding them
 MAX_SHARED_TAIL = 512  # bytes behind the data that are the clip's own; more go into the template
 
 
-class Kind(IntEnum):
+class FieldKind(IntEnum):
     """Quantity that a field counts."""
 
     COUNT = 0  # frames, in a word
@@ -43,7 +43,9 @@ class Kind(IntEnum):
 
     @property
     def size(self) -> int:
-        return 4 if self in (Kind.COUNT_FLOAT, Kind.FIRST_LONG, Kind.LAST_LONG) else 2
+        return (
+            4 if self in (FieldKind.COUNT_FLOAT, FieldKind.FIRST_LONG, FieldKind.LAST_LONG) else 2
+        )
 
 
 _WORD = bounded(UVARINT, 0, MAX_COUNT)  # C3D-05
@@ -55,7 +57,7 @@ class C3dField(Record):
     """A field of the head of a C3D that differs by clip."""
 
     at: int = field(UVARINT, "offset in head, not before the end of the field before")
-    kind: int = field(one_of(Int8ul, tuple(Kind)), "content of the field")  # C3D-09
+    kind: int = field(one_of(Int8ul, tuple(FieldKind)), "content of the field")  # C3D-09
 
 
 class C3dTemplate(Record):
@@ -108,7 +110,7 @@ class C3dLayout:
     that of C3dOutputsTemplate, () if all points are points.
     """
 
-    order: Order
+    order: ByteOrder
     word: int
     n_points: int
     n_channels: int
@@ -117,7 +119,7 @@ class C3dLayout:
     n_frames: int
     first: int
     head: bytes
-    fields: tuple[tuple[int, Kind], ...]
+    fields: tuple[tuple[int, FieldKind], ...]
     n_rotations: int = 0
     ratio: int = 1
     gap: bytes = b""
@@ -205,7 +207,7 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> C3dLayou
     head, fields = bytearray(shared.head), []
     end = n_used = 0
     for entry in shared.fields:
-        kind = Kind(entry.kind)
+        kind = FieldKind(entry.kind)
         if not end <= entry.at <= len(head) - kind.size:  # C3D-10, C3D-11
             raise FormatError(f"source template: a field at {entry.at}, {end} or more expected")
         end = entry.at + kind.size
@@ -215,7 +217,7 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> C3dLayou
     if n_used != len(own.values) or len(head) != len(shared.head):  # C3D-12
         raise FormatError(f"source detail: {len(own.values)} bytes of fields, not {n_used}")
     return C3dLayout(
-        Order(shared.processor),
+        ByteOrder(shared.processor),
         shared.word,
         shared.points,
         shared.channels,
@@ -233,9 +235,11 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> C3dLayou
     )
 
 
-def ordered_fields(fields: Sequence[tuple[int, Kind]], size: int) -> tuple[tuple[int, Kind], ...]:
+def ordered_fields(
+    fields: Sequence[tuple[int, FieldKind]], size: int
+) -> tuple[tuple[int, FieldKind], ...]:
     """The fields that lie within ``size`` bytes, sorted, without those that overlap others."""
-    ordered: list[tuple[int, Kind]] = []
+    ordered: list[tuple[int, FieldKind]] = []
     end = 0
     for at, kind in sorted(fields):
         if end <= at <= size - kind.size:

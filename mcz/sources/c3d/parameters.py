@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class ByteOrder:
     """Byte order and float format of the processor that wrote a file."""
 
     processor: int
@@ -76,7 +76,7 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class C3dParameter:
     """A parameter: its type, its dimensions (the first one varies fastest), where its data lie."""
 
     type: int
@@ -89,12 +89,12 @@ class Parameter:
 class Parameters:
     """The parameters of a file by group and name, both in capitals."""
 
-    order: Order
+    order: ByteOrder
     start: int  # of the section
-    found: dict[tuple[str, str], Parameter]
+    found: dict[tuple[str, str], C3dParameter]
     end: int  # of the last entry
 
-    def get(self, group: str, name: str) -> Parameter | None:
+    def get(self, group: str, name: str) -> C3dParameter | None:
         return self.found.get((group, name))
 
     def number(self, group: str, name: str) -> float | None:
@@ -137,7 +137,7 @@ class Parameters:
             numbers += self.numbers_of(parameter)
             count += 1
 
-    def numbers_of(self, parameter: Parameter) -> list[float]:
+    def numbers_of(self, parameter: C3dParameter) -> list[float]:
         """The numbers of one parameter that is no text, integers with a sign."""
         if parameter.type == FLOAT:
             numbers: list[float] = self.order.reals(parameter.data).tolist()
@@ -180,7 +180,7 @@ def names_of(labels: list[str], n: int, what: str) -> list[str]:
     return [label or f"{what} {number}" for number, label in enumerate(labels, 1)]
 
 
-def find_parameters(data: bytes) -> tuple[Order, int]:
+def find_parameters(data: bytes) -> tuple[ByteOrder, int]:
     """The byte order of a file and where its parameter section begins; raises SourceError."""
     if len(data) < BLOCK:
         raise SourceError("the file is truncated in its C3D header", offset=len(data))
@@ -196,16 +196,16 @@ def find_parameters(data: bytes) -> tuple[Order, int]:
         raise SourceError(
             f"processor {processor} is not 84 (Intel), 85 (DEC) or 86 (SGI)", offset=start + 3
         )
-    return Order(processor), start
+    return ByteOrder(processor), start
 
 
-def parse_parameters(data: bytes, order: Order, start: int) -> Parameters:
+def parse_parameters(data: bytes, order: ByteOrder, start: int) -> Parameters:
     """The parameters of the section at ``start``, whose first four bytes are there."""
     blocks = data[start + 2] or MAX_BLOCKS  # some files have more of them than they say
     data_start = (order.integer(data, WORD_OF_START) - 1) * BLOCK
     stop = min(max(start + blocks * BLOCK, data_start), start + MAX_BLOCKS * BLOCK, len(data))
     groups: dict[int, str] = {}
-    entries: list[tuple[int, str, Parameter]] = []
+    entries: list[tuple[int, str, C3dParameter]] = []
     at = start + 4
     while at + 2 <= stop:
         size, number = struct.unpack_from("bb", data, at)
@@ -224,14 +224,14 @@ def parse_parameters(data: bytes, order: Order, start: int) -> Parameters:
             at = after
             break
         at = after + step
-    parameters: dict[tuple[str, str], Parameter] = {}
+    parameters: dict[tuple[str, str], C3dParameter] = {}
     for number, name, parameter in entries:
         if number in groups:
             parameters.setdefault((groups[number], name), parameter)
     return Parameters(order, start, parameters, min(at, stop))
 
 
-def _parameter(data: bytes, at: int, stop: int) -> Parameter | None:
+def _parameter(data: bytes, at: int, stop: int) -> C3dParameter | None:
     """The parameter whose type stands at ``at``, None if it does not fit its section."""
     if at + 2 > stop:
         return None
@@ -243,7 +243,7 @@ def _parameter(data: bytes, at: int, stop: int) -> Parameter | None:
     size = abs(kind) * prod(dims)
     if kind not in (TEXT, BYTE, INTEGER, FLOAT) or first + size > stop:
         return None
-    return Parameter(kind, dims, first, data[first : first + size])
+    return C3dParameter(kind, dims, first, data[first : first + size])
 
 
 OUTPUTS = "outputs"
@@ -324,14 +324,14 @@ def unit_of(parameters: Parameters, groups: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Listed:
+class OutputList:
     """The labels of outputs, and under the name of each list its labels and their unit."""
 
     labels: tuple[str, ...]
     groups: dict[str, tuple[list[str], str]]
 
 
-def describe_outputs(outputs: Signal | None) -> Listed:
+def describe_outputs(outputs: Signal | None) -> OutputList:
     """Labels and lists that say what ``outputs``, channels ``NAME x``, ``NAME y``, ``NAME z``, are.
 
     The unit of an output tells its list. If there are more units than lists, the last list says
@@ -351,7 +351,7 @@ def describe_outputs(outputs: Signal | None) -> Listed:
         listed, group_unit = groups.get(group, ([], unit))
         groups[group] = ([*listed, *({label} - {*listed})], unit if group_unit == unit else "")
         labels.append(label)
-    return Listed(tuple(labels), groups)
+    return OutputList(tuple(labels), groups)
 
 
 def _list_of(unit: str, groups: dict[str, tuple[list[str], str]]) -> str:

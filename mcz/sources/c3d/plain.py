@@ -18,7 +18,7 @@ from mcz.model.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.signal import Scaling
 from mcz.sources.c3d.data_section import field_bytes, valid_points
-from mcz.sources.c3d.layout import C3dLayout, Kind
+from mcz.sources.c3d.layout import C3dLayout, FieldKind
 from mcz.sources.c3d.parameters import (
     BLOCK,
     FLOAT,
@@ -31,8 +31,8 @@ from mcz.sources.c3d.parameters import (
     UNITS_OF,
     WORD_OF_FIRST,
     WORD_OF_LAST,
-    Listed,
-    Order,
+    ByteOrder,
+    OutputList,
     describe_outputs,
 )
 
@@ -189,7 +189,7 @@ def _layout(
     motion: Motion, scale: float | None, section_data: SectionData, shape: tuple[int, int]
 ) -> C3dLayout:
     """The layout of the file: header, parameter section, fields."""
-    order, n_points = Order(INTEL), len(section_data.names)
+    order, n_points = ByteOrder(INTEL), len(section_data.names)
     n_channels, subframes = shape
     first = 1 if motion.frame_numbers is None or not motion.n_frames else motion.frame_numbers[0]
     rate = Fraction(motion.frame_rate or 0)
@@ -203,7 +203,7 @@ def _layout(
     struct.pack_into("<HHf", header, 16, start // BLOCK + 1, subframes, float(rate))
     struct.pack_into("<H", header, 298, EVENTS_KEY)
     struct.pack_into("<H", section.data, section.data_start, start // BLOCK + 1)
-    fields = [(WORD_OF_FIRST, Kind.FIRST), (WORD_OF_LAST, Kind.LAST)]
+    fields = [(WORD_OF_FIRST, FieldKind.FIRST), (WORD_OF_LAST, FieldKind.LAST)]
     fields += [(BLOCK + at, kind) for at, kind in section.fields]
     head = header + section.data
     for at, kind in fields:
@@ -243,7 +243,7 @@ class SectionData:
     """Data to write to the section: all points, outputs after the others, and analog data."""
 
     names: Sequence[str]
-    listed: Listed
+    listed: OutputList
     unit: str
     up_axis: str
     analog: Signal | None
@@ -252,11 +252,11 @@ class SectionData:
 
 
 @dataclass
-class Section:
+class ParameterSection:
     """A parameter section while it is written; offsets are counted from its start."""
 
     data: bytearray = field(default_factory=lambda: bytearray((1, 0x50, 0, INTEL)))
-    fields: list[tuple[int, Kind]] = field(default_factory=list)
+    fields: list[tuple[int, FieldKind]] = field(default_factory=list)
     data_start: int = 0
     n_groups: int = 0
 
@@ -312,14 +312,14 @@ class Section:
 
 def section_of(
     content: SectionData, scale: float, rate: Fraction, shape: tuple[int, int]
-) -> Section:
+) -> ParameterSection:
     """The section; ``shape`` are the analog channels and their samples a frame."""
-    section = Section()
+    section = ParameterSection()
     _add_points(section, content, scale, rate)
     section.group("TRIAL")
     for name, kind in (
-        ("ACTUAL_START_FIELD", Kind.FIRST_LONG),
-        ("ACTUAL_END_FIELD", Kind.LAST_LONG),
+        ("ACTUAL_START_FIELD", FieldKind.FIRST_LONG),
+        ("ACTUAL_END_FIELD", FieldKind.LAST_LONG),
     ):
         section.fields.append((section.add(name, INTEGER, (2,), bytes(4)), kind))
     _add_analog(section, content, rate, *shape)
@@ -330,10 +330,12 @@ def section_of(
     return section
 
 
-def _add_points(section: Section, content: SectionData, scale: float, rate: Fraction) -> None:
+def _add_points(
+    section: ParameterSection, content: SectionData, scale: float, rate: Fraction
+) -> None:
     section.group("POINT")
     section.number("USED", len(content.names))
-    section.fields.append((section.number("FRAMES", 0), Kind.COUNT))
+    section.fields.append((section.number("FRAMES", 0), FieldKind.COUNT))
     section.data_start = section.number("DATA_START", 0)
     section.number("SCALE", scale)
     section.number("RATE", rate)
@@ -349,7 +351,7 @@ def _add_points(section: Section, content: SectionData, scale: float, rate: Frac
 
 
 def _add_analog(
-    section: Section, content: SectionData, rate: Fraction, n_channels: int, subframes: int
+    section: ParameterSection, content: SectionData, rate: Fraction, n_channels: int, subframes: int
 ) -> None:
     section.group("ANALOG")
     channels = content.analog.channels if content.analog and content.analog.channels else ()

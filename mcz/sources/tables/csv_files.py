@@ -33,7 +33,7 @@ from mcz.sources.tables.motive import HEAD, read_motive
 from mcz.sources.tables.restore import restore_table
 from mcz.sources.tables.rows import TableRows, lines_from, move_zeros_to_gaps, read_table
 from mcz.sources.tables.signals import read_columns, read_text, table_metadata, text_note
-from mcz.sources.tables.times import Times, read_times
+from mcz.sources.tables.times import TableTimes, read_times
 from mcz.sources.tables.vicon import AXIS, read_vicon
 from mcz.sources.text.layout import FRAME_NUMBER
 from mcz.sources.text.rows import TokenRows, line_of, number_frames
@@ -183,7 +183,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     rows = move_zeros_to_gaps(
         data, number_frames(table.rows), (range(len(values)), [at] if timed else [])
     )
-    times = Times(None, (), None, True)
+    times = TableTimes(None, (), None, True)
     if time is not None and timed:
         label = head.names[time].strip()
         times = read_times(data, rows, at, unit=_seconds(label, head.units[time]), name=label)

@@ -15,7 +15,7 @@ from mcz.model.motion import Channel, Joint, Motion, Skeleton
 from mcz.sources.tables.csv_text import count_columns, is_blank, texts_of, whole_cells
 from mcz.sources.tables.rows import begins_with_number, lines_from, move_zeros_to_gaps, read_table
 from mcz.sources.tables.signals import read_columns, read_text, table_metadata, text_note
-from mcz.sources.tables.times import Times, read_times, stated_rate
+from mcz.sources.tables.times import TableTimes, read_times, stated_rate
 from mcz.sources.text.layout import FRAME_NUMBER
 from mcz.sources.text.rows import line_of, number_frames
 from mcz.sources.text.source import (
@@ -102,7 +102,7 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
         for key in ("export frame rate", "capture frame rate")
         if (rate := stated_rate(head.said.get(key, "")))
     ]
-    times = Times(None, (), None, True)
+    times = TableTimes(None, (), None, True)
     if None in texts:
         stated = []
     else:
@@ -246,7 +246,7 @@ def _skeleton(head: _Head, objects: Sequence[_Object]) -> Skeleton:
     return Skeleton(tuple(joints), unit_cm=UNITS.get(head.said.get("length units", "").lower()))
 
 
-def _notes(settings: dict[str, str], n_rows: int, times: Times, is_stated: bool) -> list[str]:
+def _notes(settings: dict[str, str], n_rows: int, times: TableTimes, is_stated: bool) -> list[str]:
     notes = []
     declared = settings.get("total exported frames", "")
     if declared and declared != str(n_rows):

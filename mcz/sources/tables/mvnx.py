@@ -42,7 +42,7 @@ from mcz.sources.tables.signals import (
     table_metadata,
 )
 from mcz.sources.tables.text_columns import TextColumn, odd_cells, split_text
-from mcz.sources.tables.times import Times, read_times, stated_rate
+from mcz.sources.tables.times import TableTimes, read_times, stated_rate
 from mcz.sources.text.rows import TokenRows, line_of, number_frames
 from mcz.sources.text.source import (
     MOST_JOINTS,
@@ -82,7 +82,7 @@ _DECIMAL = re.compile(r"[-+]?[0-9]{1,9}\.?[0-9]{0,15}")
 
 
 @dataclass(slots=True)
-class Header:
+class MvnxHeader:
     """The names in a header; ``frames`` is the offset of that element.
 
     ``labels``: of each of ``LISTS``, in order. ``points``: of each segment, by name, in meters
@@ -132,7 +132,7 @@ def is_mvnx(head: bytes) -> bool:
     return b"<mvnx" in head and _ROOT.search(head) is not None
 
 
-def read_header(data: bytes) -> Header:
+def read_header(data: bytes) -> MvnxHeader:
     """The header of an MVNX file; SourceError, with the number of the line, if it has none.
 
     It is read as UTF-8, or else as Latin-1, whatever it declares.
@@ -156,7 +156,7 @@ def _refused(error: expat.ExpatError) -> SourceError:
     return SourceError(f"not XML: {expat.ErrorString(error.code)}", line=error.lineno)
 
 
-class _Reached(Exception):
+class _FramesReached(Exception):
     """The element ``frames`` begins."""
 
 
@@ -165,13 +165,13 @@ class _Reader:
 
     def __init__(self, data: bytes) -> None:
         self._data = data
-        self._header = Header()
+        self._header = MvnxHeader()
         self._path: list[str] = []
         self._names: list[str] = []  # labels of the elements of ``_path``
         self._text: list[str] = []
         self._near: Place = ("", "")
 
-    def read(self, encoding: str) -> Header:
+    def read(self, encoding: str) -> MvnxHeader:
         parser = expat.ParserCreate(encoding)
         parser.StartElementHandler = self._start
         parser.EndElementHandler = self._end
@@ -180,7 +180,7 @@ class _Reader:
         self._parser = parser
         try:
             parser.Parse(self._data, False)
-        except _Reached:
+        except _FramesReached:
             return self._header
         more = f" in {len(self._data)} bytes" if len(self._data) == MOST_BYTES else ""
         line = line_of(self._data, len(self._data))
@@ -200,7 +200,7 @@ class _Reader:
         label = attributes.get("label", "")
         if name == "frames":
             header.frames = self._parser.CurrentByteIndex
-            raise _Reached
+            raise _FramesReached
         if path and path[-1] in LISTS:
             labels = header.labels.setdefault(path[-1], [])
             labels.append(_printable(label))
@@ -320,7 +320,7 @@ def _signal(data: bytes, rows: TokenRows, columns: Sequence[int]) -> Signal:
     return read_signal(data, select_columns(rows, columns))
 
 
-def _joints(header: Header, columns: FrameColumns) -> tuple[tuple[Joint, ...], list[str]]:
+def _joints(header: MvnxHeader, columns: FrameColumns) -> tuple[tuple[Joint, ...], list[str]]:
     """The joint of each segment, and oddities of their names."""
     labels, n_segments = header.labels.get("segments", []), columns.n_segments
     odd = []
@@ -342,7 +342,7 @@ def _joints(header: Header, columns: FrameColumns) -> tuple[tuple[Joint, ...], l
 
 
 def _elements(
-    data: bytes, rows: TokenRows, header: Header, columns: FrameColumns
+    data: bytes, rows: TokenRows, header: MvnxHeader, columns: FrameColumns
 ) -> Iterator[Signal]:
     """Signals of the elements that do not belong to the motion."""
     for name in columns.elements:
@@ -378,18 +378,18 @@ def _split_text(
     return rows, dict(zip(chosen, texts, strict=True))
 
 
-def _times(data: bytes, rows: TokenRows, header: Header, columns: FrameColumns) -> Times:
+def _times(data: bytes, rows: TokenRows, header: MvnxHeader, columns: FrameColumns) -> TableTimes:
     """The times of the frames in milliseconds, and the rate, which the header states."""
     rate = stated_rate(header.subject.get("frameRate", ""))
     stated = [] if rate is None else [rate]
     if TIME not in columns.columns:
-        return Times(None, (), rate, True)
+        return TableTimes(None, (), rate, True)
     times = read_times(data, rows, rows.start.shape[1] - 1, stated, MILLISECOND)
     near = times.rate is None and rate is not None and _are_near(times, rows, rate)
     return replace(times, rate=rate) if near else times
 
 
-def _are_near(times: Times, rows: TokenRows, rate: Fraction) -> bool:
+def _are_near(times: TableTimes, rows: TokenRows, rate: Fraction) -> bool:
     """Return True if times that were measured are those of a rate to less than a frame."""
     if not times.signals or times.signals[0].role != TIMES:
         return False

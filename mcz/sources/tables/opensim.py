@@ -24,7 +24,7 @@ from mcz.sources.tables.restore import plain_storage, plain_trc, restore_table
 from mcz.sources.tables.rows import begins_with_number, lines_from, move_zeros_to_gaps, read_table
 from mcz.sources.tables.signals import read_columns, table_metadata
 from mcz.sources.tables.times import (
-    Times,
+    TableTimes,
     as_times,
     half_digits_of,
     rate_of_times,
@@ -136,7 +136,7 @@ def _widest(data: bytes, at: int) -> int:
 
 def _trc_times(
     data: bytes, rows: TokenRows, column: int, values: dict[str, str]
-) -> tuple[Times, list[str]]:
+) -> tuple[TableTimes, list[str]]:
     """The times, and notes on oddities."""
     stated = [
         rate for key in ("datarate", "camerarate") if (rate := stated_rate(values.get(key, "")))

@@ -250,7 +250,7 @@ SECOND = Fraction(1)
 
 
 @dataclass(frozen=True, slots=True)
-class Times:
+class TableTimes:
     """``signals``: one of times if there are some that no clock gives, named ``time``.
 
     ``rate`` is None if times are not whole frames apart. ``exact``: it is round or stated.
@@ -280,7 +280,7 @@ def read_times(
     stated: Sequence[Fraction] = (),
     unit: Fraction = SECOND,
     name: str = "time",
-) -> Times:
+) -> TableTimes:
     """The times in a column; ``stated``: rates that the file states; ``unit`` in seconds."""
     present = np.flatnonzero(rows.stop[:, column])
     tokens = scan(data, rows.start[present, column], rows.stop[present, column])
@@ -311,4 +311,4 @@ def read_times(
     if clock is not None:
         half = 0.5 * 10.0**-clock.grid.digits
         printed = Timeline(tokens.values() * float(unit), rate, half * float(unit))
-    return Times(clock, signals, rate, exact, note, printed)
+    return TableTimes(clock, signals, rate, exact, note, printed)

@@ -160,7 +160,7 @@ class FrameLayout:
         template = Template(header=list(self.header), gaps=shared.gaps, patterns=shared.patterns)
         return build(template, "source template"), build(self.detail(own), "source detail")
 
-    def detail(self, own: Numbered) -> Detail:
+    def detail(self, own: PatternTable) -> Detail:
         """The detail, whose gaps and patterns are ``own``."""
         return Detail(
             count=self.count,
@@ -172,14 +172,14 @@ class FrameLayout:
         )
 
 
-class Numbered(NamedTuple):
+class PatternTable(NamedTuple):
     """The gaps and patterns of a template or a detail."""
 
     gaps: list[bytes]
     patterns: list[PatternFields]
 
 
-def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[Numbered, Numbered]:
+def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[PatternTable, PatternTable]:
     """Gaps and patterns of a template and of a detail; LimitError for too many runs."""
     if sum(len(pattern.runs) for pattern in patterns) > MAX_RUNS:
         raise LimitError(f"the frames have more than {MAX_RUNS} runs of columns")
@@ -190,7 +190,9 @@ def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[Numbered, Numbered]:
         fields.append(_pattern_fields(pattern, gaps))
         n_shared = n_shared or len(gaps)
     numbered = list(gaps)
-    return Numbered(numbered[:n_shared], fields[:1]), Numbered(numbered[n_shared:], fields[1:])
+    return PatternTable(numbered[:n_shared], fields[:1]), PatternTable(
+        numbered[n_shared:], fields[1:]
+    )
 
 
 def _pattern_fields(pattern: Pattern, gaps: dict[bytes, int]) -> PatternFields:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mcz.bench.cases import Variant
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from tools.papers.curves import at
 from tools.papers.hou2016.tasks import (
     CLIP,
@@ -36,13 +36,13 @@ FAST = 10_000  # frames a second, in the paper on MATLAB
 Row = tuple[str, str, str, str]
 
 
-def claims(found: Found) -> Table:
+def claims(found: Found) -> ResultTable:
     columns = (("the paper says", ""), ("coder", ""), ("holds", ""), ("found here", ""))
     caption = (
         f"Ratios of CR are means over D = {', '.join(f'{e:g}' for e in ERRORS)} cm, as far as both "
         f"reach it. Coder: ours, or prefix codes and thresholds of the preset {PRESET}."
     )
-    table = Table("Hou 2016, claim by claim", caption, columns)
+    table = ResultTable("Hou 2016, claim by claim", caption, columns)
     table.rows.extend(_starts(found))
     table.rows.extend(_sparse(found))
     table.rows.extend(_best_sparsity(found))
@@ -180,7 +180,7 @@ def _starts(found: Found) -> Iterator[Row]:
     kept = found.get(found.convergence())
     if not kept:
         return
-    table = Table.from_cache(kept["table"])
+    table = ResultTable.from_cache(kept["table"])
     heads = [head for head, _ in table.columns]
     ratio, share, growth = (heads.index(h) for h in ("haar / dct", "of the fall", "growth"))
     for name, grown in (("Algorithm 1 as published", False), ("ours, with growing P", True)):
@@ -205,7 +205,7 @@ def _sparse(found: Found) -> Iterator[Row]:
     kept = found.get(found.spatial())
     if not kept:
         return
-    rows = {(row[0], row[1]): row[2:] for row in Table.from_cache(kept["fig_5"]).rows}
+    rows = {(row[0], row[1]): row[2:] for row in ResultTable.from_cache(kept["fig_5"]).rows}
     less: dict[str, list[float]] = {}
     for clip in dict.fromkeys(clip for clip, _ in rows if clip != "mean"):
         others = zip(rows[clip, "DCT"], rows[clip, "Haar"], strict=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from mcz.bench.cases import Variant
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from tools.papers.curves import HIGH, LOW
 from tools.papers.hou2016.tasks import (
     CLIP,
@@ -33,7 +33,7 @@ def panels(found: Found) -> Iterator[Panels]:
     yield Panels("hou2016_domains", "Channels against positions", axes, tuple(_domain_lines(found)))
     yield Panels("hou2016_sparsity", "Hou 2016, Fig. 4: P", axes, tuple(_sparsity_lines(found)))
     if kept := found.get(found.spatial()):
-        table = Table.from_cache(kept["fig_5"])
+        table = ResultTable.from_cache(kept["fig_5"])
         axes = ("coefficients that are not zero (%)", "mean distance of points (cm)")
         spatial = tuple(_spatial_lines(table))
         yield Panels("hou2016_spatial", "Hou 2016, Fig. 5", axes, spatial, (False, True))
@@ -82,7 +82,7 @@ def _sparsity_lines(found: Found) -> Iterator[tuple[str, tuple[Line, ...]]]:
             yield f"{clip}, {variant.codec}", tuple(lines)
 
 
-def _spatial_lines(table: Table) -> Iterator[tuple[str, tuple[Line, ...]]]:
+def _spatial_lines(table: ResultTable) -> Iterator[tuple[str, tuple[Line, ...]]]:
     shares = [float(head.rstrip("%")) for head, _ in table.columns[2:]]
     for clip in dict.fromkeys(str(row[0]) for row in table.rows):
         rows = [row for row in table.rows if row[0] == clip]

@@ -8,10 +8,10 @@ from mcz.bench.tasks import Runner
 from tools.papers.hou2016.panels import panels
 from tools.papers.hou2016.tables import tables
 from tools.papers.hou2016.tasks import NAMES, measure, missing_codecs, others
-from tools.papers.outcome import Outcome, add, cases_by_name, cases_of, without
+from tools.papers.outcome import BenchResult, add, cases_by_name, cases_of, without
 
 
-def hou2016(outcome: Outcome, paths: Sequence[str], unit: str | None, runner: Runner) -> None:
+def hou2016(outcome: BenchResult, paths: Sequence[str], unit: str | None, runner: Runner) -> None:
     """Add the paper's tables; raises OptionError where none of its clips is among ``paths``."""
     here = cases_by_name(paths, unit)
     cases = cases_of(outcome, "hou2016", NAMES, here)

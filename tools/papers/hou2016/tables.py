@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from tools.papers.curves import at
 from tools.papers.hou2016.claims import claims
 from tools.papers.hou2016.tasks import (
@@ -31,20 +31,20 @@ BETWEEN = "Between measured points, straight in logarithms; - where a codec does
 HEADS = tuple((f"{error:g} cm", ".1f") for error in ERRORS)
 
 
-def tables(found: Found) -> Iterator[Table]:
+def tables(found: Found) -> Iterator[ResultTable]:
     yield claims(found)
     yield _rates(found, preset=False)
     yield _rates(found, preset=True)
     if kept := found.get(found.convergence()):
-        yield Table.from_cache(kept["table"])
+        yield ResultTable.from_cache(kept["table"])
     if kept := found.get(found.spatial()):
-        yield Table.from_cache(kept["fig_5"])
-        yield Table.from_cache(kept["by_sparsity"])
+        yield ResultTable.from_cache(kept["fig_5"])
+        yield ResultTable.from_cache(kept["by_sparsity"])
     yield from (_sparsities(found), _held_out_table(found), _domains(found), _speeds(found))
     yield _ways_back(found)
 
 
-def _rates(found: Found, *, preset: bool) -> Table:
+def _rates(found: Found, *, preset: bool) -> ResultTable:
     coder = f"preset {PRESET}: prefix codes" if preset else "our coder"
     about = "mrdwt, for reference, codes channels" if not preset else "bases as by default"
     caption = (
@@ -52,7 +52,7 @@ def _rates(found: Found, *, preset: bool) -> Table:
         f"others the well-known ones where these are best; {about}."
     )
     columns = (("clip", ""), ("frames", ",d"), ("codec", ""), *HEADS)
-    table = Table(f"Hou 2016, Fig. 6 and 7: CR at equal D, {coder}", caption, columns)
+    table = ResultTable(f"Hou 2016, Fig. 6 and 7: CR at equal D, {coder}", caption, columns)
     for clip in found.cases:
         for variant in variants(preset=preset):
             points = found.curve(clip, variant)
@@ -63,13 +63,13 @@ def _rates(found: Found, *, preset: bool) -> Table:
     return table
 
 
-def _sparsities(found: Found) -> Table:
+def _sparsities(found: Found) -> ResultTable:
     caption = (
         f"CR at D of, bases trained on {len(found.training)} clips (every frame of {EVERY}, at "
         f"most {found.iterations} iterations) and not counted, as in the paper. {D}. {BETWEEN}."
     )
     columns = (("clip", ""), ("codec", ""), ("P", "d"), *HEADS)
-    table = Table("Hou 2016, Fig. 4: P", caption, columns)
+    table = ResultTable("Hou 2016, Fig. 4: P", caption, columns)
     for variant in OWN.values():
         for clip in found.papers:
             for P in SPARSITIES:
@@ -81,7 +81,7 @@ def _sparsities(found: Found) -> Table:
     return table
 
 
-def _held_out_table(found: Found) -> Table:
+def _held_out_table(found: Found) -> ResultTable:
     errors = (0.2, 0.5, 1.0)
     caption = (
         "Payload and overhead in bytes at D of, with the bases of this package, whose training saw "
@@ -101,7 +101,7 @@ def _held_out_table(found: Found) -> Table:
             )
         ),
     )
-    table = Table("Bases on a subject that they never saw", caption, columns)
+    table = ResultTable("Bases on a subject that they never saw", caption, columns)
     for clip in found.cases:
         if any(same_subject(clip, name) for name in TRAINING_CLIPS):
             continue  # 86: its bases have seen it
@@ -125,14 +125,14 @@ def _bytes_at(points: Sequence[dict[str, Any]], error: float) -> float | None:
     return at(without, "cm", error, "bytes")
 
 
-def _domains(found: Found) -> Table:
+def _domains(found: Found) -> ResultTable:
     caption = (
         f"CR: {CR}. {D}; of channels through kinematics. {BETWEEN}. channels: the codec is given "
         "the channels of the clip, and decodes to channels; from places these are not to be had "
         "without inverse kinematics."
     )
     columns = (("clip", ""), ("codec", ""), ("domain", ""), *HEADS)
-    table = Table("Channels against positions at equal position error", caption, columns)
+    table = ResultTable("Channels against positions at equal position error", caption, columns)
     for clip in found.cases:
         pairs = [(v, d) for v in (CLIP, RDO) for d in ("positions", "channels")]
         for variant, domain in [*pairs, (REFERENCE, "channels")]:
@@ -145,7 +145,7 @@ def _domains(found: Found) -> Table:
     return table
 
 
-def _speeds(found: Found) -> Table:
+def _speeds(found: Found) -> ResultTable:
     caption = (
         f"Clip {found.one.name}, each codec at its setting for D = {SPEED_CM} cm. Frames a second "
         "of CPU time, warm, one core, the fastest of several runs, the codec alone, values to "
@@ -156,7 +156,7 @@ def _speeds(found: Found) -> Table:
         *(("codec", ""), ("mode", ""), ("setting", ".3g"), ("encode f/s", ",d")),
         *(("decode f/s", ",d"), ("encode / mrdwt", ".3f"), ("decode / mrdwt", ".3f")),
     )
-    table = Table("Hou 2016: speed", caption, columns)
+    table = ResultTable("Hou 2016: speed", caption, columns)
     rows = found.get(found.speeds()) or []
     base = next((row for row in rows if row["label"] == REFERENCE.label), None)
     for row in rows:
@@ -167,7 +167,7 @@ def _speeds(found: Found) -> Table:
     return table
 
 
-def _ways_back(found: Found) -> Table:
+def _ways_back(found: Found) -> ResultTable:
     caption = (
         f"Clip {found.one.name}: places of points, as they are or coded by lsdt-clip at a step, "
         "fitted by inverse kinematics. places: mean distance of what is fitted; points, virtual "
@@ -180,7 +180,7 @@ def _ways_back(found: Found) -> Table:
         *(("points mean cm", ".4f"), ("points max cm", ".3f"), ("virtual markers cm", ".4f")),
         *(("angles deg", ".4f"), ("turns deg", ".4f")),
     )
-    table = Table("Back to channels by inverse kinematics", caption, columns)
+    table = ResultTable("Back to channels by inverse kinematics", caption, columns)
     for step in STEPS_CM:
         for marked in (False, True):
             row = found.get(found.way_back(step, virtual_markers=marked))

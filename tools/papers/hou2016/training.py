@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.bench.cases import Case, load
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from mcz.codecs.training import frames_of, training_set
 from mcz.codecs.transforms.bases import GROWTH, ITERATIONS, dct_matrix, haar_basis, learn_bases
 from mcz.errors import MotionError
@@ -67,7 +67,7 @@ def convergence(
     return curves
 
 
-def convergence_table(curves: Sequence[Curve], n_frames: int, n_points: int) -> Table:
+def convergence_table(curves: Sequence[Curve], n_frames: int, n_points: int) -> ResultTable:
     """Both starts beside each other.
 
     ``haar / dct`` compares where they end; "of the fall" is their difference as a share of how far
@@ -86,7 +86,7 @@ def convergence_table(curves: Sequence[Curve], n_frames: int, n_points: int) -> 
         "as published. haar / dct: at the end; of the fall: their difference there, as a share of "
         "how far the objective has fallen."
     )
-    table = Table("Hou 2016, Fig. 3: convergence", caption, columns)
+    table = ResultTable("Hou 2016, Fig. 3: convergence", caption, columns)
     size = max(1, n_frames * n_points)
     by_start = {(c.axis, c.growth, c.start): c for c in curves}
     for curve in curves:
@@ -136,7 +136,7 @@ def distortions(
 
 def distortion_table(
     clips: Mapping[str, Floats], transforms: Mapping[str, Transform], title: str = ""
-) -> Table:
+) -> ResultTable:
     """Fig. 5: rows of clips and transforms, columns of shares; last the mean over the clips."""
     columns = (("clip", ""), ("transform", ""), *((f"{share:.0%}", ".3f") for share in SHARES))
     caption = (
@@ -145,7 +145,7 @@ def distortion_table(
         "frames, as in the paper; as shipped: from steps between frames, as codecs code them. "
         "mean: over clips."
     )
-    table = Table(title or "Hou 2016, Fig. 5: spatial decorrelation", caption, columns)
+    table = ResultTable(title or "Hou 2016, Fig. 5: spatial decorrelation", caption, columns)
     sums = {name: np.zeros(len(SHARES)) for name in transforms}
     for clip, positions in clips.items():
         for name, transform in transforms.items():

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from mcz.bench.tasks import Runner
 from tools.papers.khan2014.tables import NAMES, missing_codecs, tables, tasks
-from tools.papers.outcome import Outcome, add, cases_by_name, cases_of, without
+from tools.papers.outcome import BenchResult, add, cases_by_name, cases_of, without
 
 
-def khan2014(outcome: Outcome, paths: Sequence[str], unit: str | None, runner: Runner) -> None:
+def khan2014(outcome: BenchResult, paths: Sequence[str], unit: str | None, runner: Runner) -> None:
     """Add the paper's tables; raises OptionError where none of its clips is among ``paths``."""
     cases = cases_of(outcome, "khan2014", NAMES, cases_by_name(paths, unit))
     without(outcome, "khan2014", missing_codecs())

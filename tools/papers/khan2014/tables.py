@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mcz.bench.cases import Case, Variant, has_preset, preset_of
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from mcz.bench.tasks import Task
 from mcz.codecs import CODECS
 from tools.papers.khan2014.printed import BYTES_2014, DWT_2014, KHAN_2014, KHAN_2017, QBC_2014
@@ -73,7 +73,7 @@ def _at_common(case: Case, clip: str, variant: Variant) -> Task:
     return Task("at", case, variant, ("mse", _common_mse(clip), float(value)))
 
 
-def tables(cases: Mapping[str, Case], results: Results) -> Iterator[Table]:
+def tables(cases: Mapping[str, Case], results: Results) -> Iterator[ResultTable]:
     if not cases or not here():
         return
     yield _table_4(cases, results)
@@ -109,7 +109,7 @@ def _times(ours: float | None, paper: float | None) -> float | None:
     return ours / paper if ours and paper else None
 
 
-def _table_4(cases: Mapping[str, Case], results: Results) -> Table:
+def _table_4(cases: Mapping[str, Case], results: Results) -> ResultTable:
     columns = (
         *(("clip", ""), ("codec", ""), ("parameter", "")),
         *(("paper MSE", ".3f"), ("paper CR", ".2f")),
@@ -123,7 +123,7 @@ def _table_4(cases: Mapping[str, Case], results: Results) -> Table:
         "paper's MSE: between two measured settings, straight in logarithms. mean cm: "
         "mean_position_error_cm of that."
     )
-    table = Table("Khan 2014, Table 4", caption, columns)
+    table = ResultTable("Khan 2014, Table 4", caption, columns)
     for clip, case in cases.items():
         for codec in here():
             row = _Row(clip, case, codec)
@@ -142,13 +142,13 @@ def _table_4(cases: Mapping[str, Case], results: Results) -> Table:
     return table
 
 
-def _later(cases: Mapping[str, Case], results: Results) -> Table:
+def _later(cases: Mapping[str, Case], results: Results) -> ResultTable:
     columns = (
         *(("clip", ""), ("codec", ""), ("paper MSE", ".4f"), ("paper CR", ".2f")),
         *(("default at this MSE: CR", ".2f"), ("times", ".2f")),
     )
     caption = f"{_remark(cases)}. {METRICS}. For 10_03 and 05_01 the paper says: at an MSE below 1."
-    table = Table("Khan 2017, text and Table III", caption, columns)
+    table = ResultTable("Khan 2017, text and Table III", caption, columns)
     for clip, case in cases.items():
         for codec, (mse, cr) in KHAN_2017.get(clip, {}).items():
             if codec in here():
@@ -157,13 +157,13 @@ def _later(cases: Mapping[str, Case], results: Results) -> Table:
     return table
 
 
-def _order(cases: Mapping[str, Case], results: Results) -> Iterator[Table]:
+def _order(cases: Mapping[str, Case], results: Results) -> Iterator[ResultTable]:
     columns = (
         *(("clip", ""), ("MSE", ".3f"), ("default, best first: CR", "")),
         *(("preset khan2014, best first: CR", ""), ("QBC > DWT > AWT > PCA", "")),
     )
     caption = f"{_remark(cases)}. {METRICS}, that of the paper's QBC for every codec."
-    table = Table("Order of the codecs at equal MSE", caption, columns)
+    table = ResultTable("Order of the codecs at equal MSE", caption, columns)
     for clip, case in cases.items():
         texts, holds = [], []
         for published in (False, True):
@@ -181,13 +181,13 @@ def _order(cases: Mapping[str, Case], results: Results) -> Iterator[Table]:
     yield table
 
 
-def _thresholds(cases: Mapping[str, Case], results: Results) -> Table:
+def _thresholds(cases: Mapping[str, Case], results: Results) -> ResultTable:
     columns = (
         *(("clip", ""), ("t_w", "d"), ("published MSE", ".4f"), ("preset MSE", ".4f")),
         *(("difference", ".4f"), ("preset CR", ".2f")),
     )
     caption = f"{_remark(cases)}. {METRICS}. Published: by the author's program."
-    table = Table("Khan 2014's DWT by threshold", caption, columns)
+    table = ResultTable("Khan 2014's DWT by threshold", caption, columns)
     for clip, case in cases.items():
         for threshold, mse in DWT_2014.get(clip, {}).items():
             found = results[_threshold(case, threshold)]
@@ -197,10 +197,10 @@ def _thresholds(cases: Mapping[str, Case], results: Results) -> Table:
     return table
 
 
-def _published_qbc(cases: Mapping[str, Case], results: Results) -> Table:
+def _published_qbc(cases: Mapping[str, Case], results: Results) -> ResultTable:
     columns = (("clip", ""), ("d2_lmt", "d"), ("published MSE", ".4f"), ("preset MSE", ".4f"))
     caption = f"{METRICS}. Published: by the author's program."
-    table = Table("Khan 2014's QBC", caption, columns)
+    table = ResultTable("Khan 2014's QBC", caption, columns)
     for clip, case in cases.items():
         if clip in QBC_2014:
             limit, mse = QBC_2014[clip]

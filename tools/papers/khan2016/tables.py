@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mcz.bench.cases import Case, Variant, has_preset, preset_of
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from mcz.bench.tasks import Task
 from mcz.codecs import CODECS
 from tools.papers.khan2016.printed import FIG_7, FIG_7_ELSE, FIG_8, TABLE_4, TABLE_4_ELSE
@@ -84,7 +84,7 @@ def _levels(case: Case) -> Task:
     return Task("resolutions", case, preset_of("mrdwt", "khan2016"), ("rfoot", *params))
 
 
-def tables(cases: Mapping[str, Case], results: Results) -> Iterator[Table]:
+def tables(cases: Mapping[str, Case], results: Results) -> Iterator[ResultTable]:
     swept = {clip: case for clip, case in cases.items() if clip != FIG_8_CLIP}
     if swept and here():
         yield _table_4(swept, results)
@@ -99,7 +99,7 @@ def _size(case: Case) -> str:
     return f"{Path(case.path).stat().st_size:,} bytes of .amc"
 
 
-def _table_4(cases: Mapping[str, Case], results: Results) -> Table:
+def _table_4(cases: Mapping[str, Case], results: Results) -> ResultTable:
     columns = (
         *(("clip", ""), ("codec", "")),
         *(("paper CR", ".1f"), ("paper eps_d", ".3f"), ("paper f/s", "")),
@@ -115,7 +115,7 @@ def _table_4(cases: Mapping[str, Case], results: Results) -> Table:
         "of CPU time, warm, encoder and decoder alone at their standard setting; / parse: as a "
         "ratio to parsing the text in the same run."
     )
-    table = Table("Khan 2016, Table 4: QBC and MRDWT", caption, columns)
+    table = ResultTable("Khan 2016, Table 4: QBC and MRDWT", caption, columns)
     for clip, case in cases.items():
         for variant in _variants():
             _, cr, eps, encode, decode = _paper(clip, variant.codec)
@@ -134,7 +134,7 @@ def _table_4(cases: Mapping[str, Case], results: Results) -> Table:
     return table
 
 
-def _figure_7(clip: str, case: Case, results: Results) -> Table:
+def _figure_7(clip: str, case: Case, results: Results) -> ResultTable:
     columns = (
         *(("T_g", "g"), ("paper CR", ".1f"), ("CR", ".2f"), ("times", ".2f")),
         ("CR, deflate", ".2f"),
@@ -146,7 +146,7 @@ def _figure_7(clip: str, case: Case, results: Results) -> Table:
         "virtual markers: virtual_marker_mean_cm. CR, deflate: the same integers with run lengths "
         "in one deflated blob, nothing else counted."
     )
-    table = Table(f"Khan 2016, Fig. 7: {clip}", caption, columns)
+    table = ResultTable(f"Khan 2016, Fig. 7: {clip}", caption, columns)
     for T_g in _thresholds(clip):
         cr, eps = FIG_7.get(clip, {}).get(int(T_g), (None, None))
         found = results[_threshold(case, T_g)]
@@ -164,7 +164,7 @@ def _figure_7(clip: str, case: Case, results: Results) -> Table:
     return table
 
 
-def _figure_8(case: Case, results: Results) -> Table:
+def _figure_8(case: Case, results: Results) -> ResultTable:
     columns = (
         *(("finest levels left out", "d"), ("paper MSE", ".3f"), ("MSE", ".4f")),
         *(("bytes read for the joint", ",d"), ("bytes read for all joints", ",d")),
@@ -175,7 +175,7 @@ def _figure_8(case: Case, results: Results) -> Table:
         "degrees squared. Bytes read: after opening. "
         f"The file has {found.get('file_bytes', 0):,} bytes."
     )
-    table = Table("Khan 2016, Fig. 8", caption, columns)
+    table = ResultTable("Khan 2016, Fig. 8", caption, columns)
     for row in found.get("rows", ()):
         level = row["resolution"]
         read = (row["bytes_read_joint"], row["bytes_read_all"])

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from tools.papers.kwak.clips import Clip
 from tools.papers.kwak.measure import NAME
 from tools.papers.kwak.printed import (
@@ -42,14 +42,14 @@ Row = tuple[str, str, str, str]
 Judged = list[tuple[Clip, bool, str]]
 
 
-def claims(found: Found) -> Table:
+def claims(found: Found) -> ResultTable:
     columns = (("the paper says", ""), ("of", ""), ("holds", ""), ("found here", ""))
     caption = (
         "Each clip by itself, at 3 to 7 kbps. Percent of bits are BD rates, dB BD SQNR; where two "
         "curves share no SQNR there is no BD rate. Deviations are held against the paper's of the "
         "same clip, or where it has none against the mean of its clips."
     )
-    table = Table("Kwak and Bajic, claim by claim", caption, columns)
+    table = ResultTable("Kwak and Bajic, claim by claim", caption, columns)
     table.rows.extend(_orders(found))
     table.rows.extend(_savings(found))
     table.rows.extend(_rates(found))

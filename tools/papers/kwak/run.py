@@ -9,10 +9,10 @@ from tools.papers.kwak.clips import NAMES, find_clips
 from tools.papers.kwak.panels import panels
 from tools.papers.kwak.tables import tables
 from tools.papers.kwak.tasks import measure, missing_codecs
-from tools.papers.outcome import Outcome, absent, add, without
+from tools.papers.outcome import BenchResult, absent, add, without
 
 
-def kwak(outcome: Outcome, paths: Sequence[str], unit: str | None, runner: Runner) -> None:
+def kwak(outcome: BenchResult, paths: Sequence[str], unit: str | None, runner: Runner) -> None:
     """Add the paper's tables; raises OptionError where no clip is among ``paths``."""
     found = measure(runner, find_clips(paths, unit))
     absent(outcome, "kwak", NAMES, (clip.stem for clip in found.clips))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.bench.tables import Table
+from mcz.bench.tables import ResultTable
 from tools.papers.curves import at
 from tools.papers.kwak.claims import claims
 from tools.papers.kwak.clips import POINTS, VIRTUAL, Clip, motion_in_positions
@@ -49,7 +49,7 @@ CLIPS = (
 ERRORS_CM = (0.5, 1.0, 2.0)
 
 
-def tables(found: Found) -> Iterator[Table]:
+def tables(found: Found) -> Iterator[ResultTable]:
     yield claims(found)
     for markers in (True, False):
         yield _rates(found, markers)
@@ -60,7 +60,7 @@ def tables(found: Found) -> Iterator[Table]:
     yield from (_periods(found), _resets(found), _packets(found), _losses(found), _speeds(found))
 
 
-def _rates(found: Found, markers: bool) -> Table:
+def _rates(found: Found, markers: bool) -> ResultTable:
     numbers = "IV and V" if markers else "VIII and IX"
     asked = "those that MOD had at about 3 to 7 kbps" if markers else "exact"
     methods = (RC, RCA, STEADY, OURS, CHAINED)
@@ -75,7 +75,7 @@ def _rates(found: Found, markers: bool) -> Table:
         f"steady: our rate control with MOD's transform and coder; ours: with ours, every fourth "
         f"LTR intra coded, or none, and the basis that a live encoder has. {CLIPS}."
     )
-    table = Table(f"Kwak and Bajic, Tables {numbers}: rate control", caption, columns)
+    table = ResultTable(f"Kwak and Bajic, Tables {numbers}: rate control", caption, columns)
     for clip in found.clips:
         if clip.is_markers != markers:
             continue
@@ -92,7 +92,7 @@ def _rates(found: Found, markers: bool) -> Table:
     return table
 
 
-def _deviations(found: Found, markers: bool) -> Table:
+def _deviations(found: Found, markers: bool) -> ResultTable:
     methods = (MOD, RC, RCA, STEADY, OURS, CHAINED)
     columns = (
         ("clip", ""),
@@ -104,7 +104,7 @@ def _deviations(found: Found, markers: bool) -> Table:
         "rates. ours: every fourth group has an intra coded LTR."
     )
     title = f"Kwak and Bajic, Table {'VI' if markers else 'X'}: bytes a group"
-    table = Table(title, caption, columns)
+    table = ResultTable(title, caption, columns)
     for clip in found.clips:
         if clip.is_markers == markers:
             cells = [deviation(found, clip, method) for method in methods]
@@ -118,7 +118,7 @@ def deviation(found: Found, clip: Clip, method: Any) -> float | None:
     return float(np.mean(values)) if values else None
 
 
-def _bd(found: Found) -> Table:
+def _bd(found: Found) -> ResultTable:
     columns = (
         *(("clip", ""), ("method", ""), ("BD SQNR dB", ".2f"), ("BD rate %", ".1f")),
         *(("paper's dB", ".2f"), ("paper's %", ".1f")),
@@ -133,7 +133,7 @@ def _bd(found: Found) -> Table:
         "rate control, its step searched for; basis of the clip: learned from all of it, its bytes "
         "counted in BD, so no online codec."
     )
-    table = Table("Kwak and Bajic, Table III: BD SQNR and BD rate", caption, columns)
+    table = ResultTable("Kwak and Bajic, Table III: BD SQNR and BD rate", caption, columns)
     for clip in found.clips:
         for method in ALL:
             points = found.rates(clip, method)
@@ -149,7 +149,7 @@ def _bd(found: Found) -> Table:
     return table
 
 
-def _sizes(found: Found) -> Table:
+def _sizes(found: Found) -> ResultTable:
     heads = tuple((f"{error:g} cm", ",d") for error in ERRORS_CM)
     columns = (("clip", ""), ("codec", ""), *heads, *((f"/ ours {h}", ".2f") for h, _ in heads))
     caption = (
@@ -157,7 +157,7 @@ def _sizes(found: Found) -> Table:
         "between measured ones, straight in logarithms; - where a codec does not reach it. "
         "/ ours: as a ratio to ours at a held rate."
     )
-    table = Table("Bytes at equal mean error", caption, columns)
+    table = ResultTable("Bytes at equal mean error", caption, columns)
     for clip in found.skeletons:
         rows = [
             (label, [at(points, "cm", cm, "coded_bytes") for cm in ERRORS_CM])
@@ -177,7 +177,7 @@ def file_curves(found: Found, clip: Clip) -> Iterator[tuple[str, list[Any]]]:
             yield label, points
 
 
-def _markers(found: Found) -> Table:
+def _markers(found: Found) -> ResultTable:
     heads = (3.0, 5.0, 7.0)
     columns = (
         *(("clip", ""), ("method", ""), ("points", "d"), ("with", "d")),
@@ -189,7 +189,7 @@ def _markers(found: Found) -> Table:
         "without, at the mean error that the points alone have at so many kbps; the paper says "
         f"{low:g} to {high:g}. Of FIL behind the filter."
     )
-    table = Table("What virtual markers cost", caption, columns)
+    table = ResultTable("What virtual markers cost", caption, columns)
     for clip in found.skeletons:
         for method in WITH_MARKERS:
             for ended in (method, method.behind_filter()):
@@ -203,7 +203,7 @@ def n_points(clip: Clip) -> int:
     return motion_in_positions(clip).skeleton.n_joints
 
 
-def _coders(found: Found) -> Table:
+def _coders(found: Found) -> ResultTable:
     columns = (
         *(("clip", ""), ("MOD's kbps", ".0f"), ("transform", ""), ("SQNR", ".2f")),
         *(("Rice alone", ".3f"), ("golomb", ".3f"), ("mixed", ".3f"), ("mixed / golomb", ".3f")),
@@ -214,7 +214,7 @@ def _coders(found: Found) -> Table:
         "their bits coded by an adaptive arithmetic coder, as published; mixed: ours. What is "
         "learned from the clip itself is not counted."
     )
-    table = Table("Entropy coders and transforms", caption, columns)
+    table = ResultTable("Entropy coders and transforms", caption, columns)
     for clip in found.study_clips:
         for row in found.get(study_task(clip, "coders", *CODER_KBPS)) or []:
             cells = [row[key] for key in ("rice", "golomb", "mixed")]
@@ -223,7 +223,7 @@ def _coders(found: Found) -> Table:
     return table
 
 
-def _periods(found: Found) -> Table:
+def _periods(found: Found) -> ResultTable:
     columns = (
         *(("clip", ""), ("intra_period", ""), ("kbps, one step", ".3f"), ("against 0 %", ".1f")),
         *(("SQNR", ".2f"), ("SQNR, rate held", ".2f")),
@@ -232,7 +232,7 @@ def _periods(found: Found) -> Table:
         f"{KBPS} at one step, with which intra_period 0 (the first LTR alone) has {STUDY_KBPS:g}; "
         f"SQNR, rate held: at {STUDY_KBPS:g} kbps with rate control. Our coder and transform."
     )
-    table = Table("What intra coded LTRs cost", caption, columns)
+    table = ResultTable("What intra coded LTRs cost", caption, columns)
     for clip in found.study_clips:
         rows = found.get(study_task(clip, "periods", STUDY_KBPS)) or []
         least = next((row["kbps"] for row in rows if not row["period"]), None)
@@ -243,7 +243,7 @@ def _periods(found: Found) -> Table:
     return table
 
 
-def _resets(found: Found) -> Table:
+def _resets(found: Found) -> ResultTable:
     columns = (
         *(("clip", ""), ("frames a group", ""), ("mixed", ".3f"), ("against one group %", ".1f")),
         *(("golomb", ".3f"), ("against one group %", ".1f"), ("SQNR", ".2f")),
@@ -252,7 +252,7 @@ def _resets(found: Found) -> Table:
         f"{KBPS} at one step. Every group begins with a coder that has learned nothing and an LTR, "
         "so that this is the cost of both. ltr_step 1, intra_period 0."
     )
-    table = Table("What groups of frames cost", caption, columns)
+    table = ResultTable("What groups of frames cost", caption, columns)
     for clip in found.study_clips:
         rows = found.get(study_task(clip, "resets", STUDY_KBPS)) or []
         for row in rows:
@@ -264,7 +264,7 @@ def _resets(found: Found) -> Table:
     return table
 
 
-def _packets(found: Found) -> Table:
+def _packets(found: Found) -> ResultTable:
     columns = (
         *(("clip", ""), ("preset", ""), ("stored", ".3f"), ("with heads", ".3f")),
         *(("frame by frame", ".3f"), ("with heads", ".3f"), ("packets", ".3f")),
@@ -275,7 +275,7 @@ def _packets(found: Found) -> Table:
         "payload and streams live, a unit a frame, each ended by itself; all bytes of packets in a "
         "live file; the same with skeleton and clip repeated at every intra coded LTR."
     )
-    table = Table("What a live stream costs", caption, columns)
+    table = ResultTable("What a live stream costs", caption, columns)
     keys = ("stored", "framed", "terminated", "streams", "packets", "with_entries")
     for clip in found.study_clips:
         for row in found.get(study_task(clip, "packets", STUDY_KBPS)) or []:
@@ -283,7 +283,7 @@ def _packets(found: Found) -> Table:
     return table
 
 
-def _losses(found: Found) -> Table:
+def _losses(found: Found) -> ResultTable:
     columns = (
         *(("clip", ""), ("stream", ""), ("kbps", ".2f"), ("lost %", ".0f")),
         *(("concealed %", ".1f"), ("mean error cm", ".2f"), ("SQNR", ".2f")),
@@ -296,7 +296,7 @@ def _losses(found: Found) -> Table:
         "frame, whose entropy coder is taken to allow it; what it shows is wrong, and it says "
         "nothing."
     )
-    table = Table("Lost frames", caption, columns)
+    table = ResultTable("Lost frames", caption, columns)
     for clip in found.skeletons:
         for row in (found.get(study_task(clip, "losses", STUDY_KBPS)) or {}).get("rows", []):
             cells = (row["kbps"], 100 * row["share"], 100 * row["concealed"])
@@ -304,7 +304,7 @@ def _losses(found: Found) -> Table:
     return table
 
 
-def _speeds(found: Found) -> Table:
+def _speeds(found: Found) -> ResultTable:
     columns = (
         *(("codec", ""), ("settings", ""), ("frame by frame", "")),
         *(("encode f/s", ",d"), ("decode f/s", ",d")),
@@ -315,7 +315,7 @@ def _speeds(found: Found) -> Table:
         f"{clip.name if clip else 'No clip'}: frames a second of CPU time in one run, warm, by the "
         f"codec alone. The paper's, in MATLAB: {1000 / ENCODE_MS:.0f} and {1000 / DECODE_MS:.0f}."
     )
-    table = Table("Kwak and Bajic, Table XI: speed", caption, columns)
+    table = ResultTable("Kwak and Bajic, Table XI: speed", caption, columns)
     rows = (found.get(speeds_task(clip)) if clip else None) or []
     base = next((row for row in rows if row["label"] == "mrdwt"), None)
     for row in rows:

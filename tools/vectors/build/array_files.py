@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mcz.model.motion import Motion
 from mcz.model.schema import varint
 from mcz.sources import FORMATS
-from mcz.sources.arrays.layout import Kind, Piece
+from mcz.sources.arrays.layout import Piece, PieceKind
 from tools.vectors.build.source_files import set_path
 
 SPEC = "Template of arrays; The bytes of arrays"
@@ -121,14 +121,14 @@ def raw(piece: Piece, **fields: Any) -> bytes:
     piece = replace(piece, **fields)
     kind = bytes((piece.kind,))
     match piece.kind:
-        case Kind.TEXT:
+        case PieceKind.TEXT:
             return kind + varint(len(piece.text)) + piece.text
-        case Kind.OWN:
+        case PieceKind.OWN:
             return kind
-        case Kind.COUNT:
+        case PieceKind.COUNT:
             after = varint(len(piece.after)) + piece.after
             return kind + varint(piece.signal) + after + varint(piece.size)
-        case Kind.DATA:
+        case PieceKind.DATA:
             runs = b"".join(varint(channel) + varint(n) for channel, n in piece.runs)
             said = bytes((piece.type, piece.flags)) + varint(len(piece.runs))
             return kind + varint(piece.signal) + said + runs
