@@ -84,7 +84,7 @@ def test_sqnr_is_that_of_the_definition() -> None:
 @pytest.mark.parametrize("rises", [False, True])
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_ladder_has_evenly_spaced_sizes(rises: bool, whole: bool) -> None:
-    dial = Dial("q", 1.0 if whole else 2.0**-20, 2.0**20, rises=rises, whole=whole)
+    dial = Dial("q", 1.0 if whole else 2.0**-20, 2.0**20, rises=rises, is_integer=whole)
 
     def size(setting: float) -> float:
         return 50.0 * setting**0.5 if rises else 50_000.0 / setting**0.5
