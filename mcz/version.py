@@ -1,3 +1,3 @@
 """The version of the package, which files that others read name as their generator."""
 
-VERSION = "0.99.0"
+VERSION = "1.0.0"

@@ -30,10 +30,10 @@ def file(*words: object) -> str:
 
 def test_file_says_what_head_says(samples: Path, tmp_path: Path) -> None:
     sound = VECTORS / "valid/container/minimal.mcz"
-    told = r"MCZ motion capture, version 0\.99, for readers of 0\.99, base profile"
+    told = r"MCZ motion capture, version 1\.0, for readers of 1\.0, base profile"
     assert re.fullmatch(told, file(sound))
     newer = VECTORS / "uncommon/container/newer-minor.mcz"
-    assert ", for readers of 0.255, base profile" in file(newer)
+    assert ", for readers of 1.255, base profile" in file(newer)
     assert file("--mime-type", sound) == TYPE
     assert file("--extension", sound) == "mcz"
     (tmp_path / "cut.mcz").write_bytes(sound.read_bytes()[:40])

@@ -1,11 +1,11 @@
-"""Write conformance/vectors, their manifest and SHA256SUMS; nothing else ever does.
+"""Write conformance/vectors and their manifest; nothing else ever does.
 
-    python tools/make_vectors.py [--check] [TABLE ...]
+    python tools/make_vectors.py [--check | --freeze] [TABLE ...]
 
 The same code and the same zlib give the same bytes: there are no clocks and no dice. ``--check``
-writes nothing and says whether all files are as they would be written. Vectors of a released
-format are frozen (SPEC.md, "Versions"): from 1.0 on this program refuses to change or remove a
-file that SHA256SUMS lists.
+writes nothing and says whether all files are as they would be written. Files that SHA256SUMS lists
+are frozen (SPEC.md, "Versions"): they and their rows of the manifest stay as they are, whatever
+today's encoders would make of them. ``--freeze``, at the release of a version, lists all files.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
-from mcz.container.limits import FORMAT, FORMAT_NAME  # noqa: E402 - needs the path
+from mcz.container.limits import FORMAT_NAME  # noqa: E402 - needs the path
 from tools.vectors import uncommon, valid  # noqa: E402 - needs the path
 from tools.vectors.bases import MADE  # noqa: E402
 from tools.vectors.build.files import OK, REFUSED, Vector  # noqa: E402
@@ -119,11 +119,10 @@ def _hash(data: bytes) -> str:
 
 
 def files() -> dict[str, bytes]:
-    """Path below conformance/ and content of every file."""
+    """Path below conformance/ and content of every vector, and of the manifest."""
     made = vectors()
     written = {f"vectors/{vector.name}.mcz": vector.data for vector in made}
-    manifest = _manifest(rows(made)).encode()
-    return written | {"manifest.json": manifest, SUMS: _sums(_hashes(written))}
+    return _with_frozen(written, rows(made), frozen())
 
 
 def files_of(names: Collection[str]) -> dict[str, bytes]:
@@ -133,35 +132,54 @@ def files_of(names: Collection[str]) -> dict[str, bytes]:
         raise SystemExit(f"make_vectors: there is no table {', '.join(unknown)}")
     own: dict[str, Row] = {row.name: row for name in names for row in tables()[name]}
     made = [row.vector() for row in own.values()]
-    listed = json.loads((CONFORMANCE / "manifest.json").read_text("utf-8"))["vectors"]
-    kept = [fields for fields in listed if fields["file"].removesuffix(".mcz") not in own]
+    kept = [fields for fields in _listed() if fields["file"].removesuffix(".mcz") not in own]
     every = [*own, *(fields["file"].removesuffix(".mcz") for fields in kept)]
-    groups = list(GROUPS)
-    whole = [*kept, *rows(made, every)]
-    whole.sort(key=lambda fields: (groups.index(fields["group"]), fields["file"][:-4]))
     written = {f"vectors/{vector.name}.mcz": vector.data for vector in made}
-    hashes = listed_hashes((CONFORMANCE / SUMS).read_text("ascii")) | _hashes(written)
-    return written | {"manifest.json": _manifest(whole).encode(), SUMS: _sums(hashes)}
+    known = {path: digest for path, digest in frozen().items() if path in written}
+    return _with_frozen(written, [*kept, *rows(made, every)], known)
 
 
-def listed_hashes(sums: str) -> dict[str, str]:
-    """Path below conformance/ and SHA-256 of every file that ``sums`` lists."""
-    return {path: digest for digest, path in (line.split("  ") for line in sums.splitlines())}
+def _listed() -> list[dict[str, Any]]:
+    """The rows of the manifest as it stands."""
+    listed: list[dict[str, Any]] = json.loads((CONFORMANCE / "manifest.json").read_text("utf-8"))[
+        "vectors"
+    ]
+    return listed
 
 
-def changes_of_frozen(listed: Mapping[str, str], sums: str) -> list[str]:
-    """Paths of ``listed`` that ``sums`` leaves out or gives another SHA-256."""
-    now = listed_hashes(sums)
-    return sorted(path for path, digest in listed.items() if now.get(path) != digest)
+def frozen() -> dict[str, str]:
+    """Path below conformance/ and SHA-256 of every file that must stay as it is."""
+    path = CONFORMANCE / SUMS
+    lines = path.read_text("ascii").splitlines() if path.exists() else []
+    return {path: digest for digest, path in (line.split("  ") for line in lines)}
 
 
-def _hashes(written: Mapping[str, bytes]) -> dict[str, str]:
-    return {path: _hash(data) for path, data in written.items()}
+def _with_frozen(
+    written: Mapping[str, bytes], rows: Sequence[dict[str, Any]], listed: Mapping[str, str]
+) -> dict[str, bytes]:
+    """Files and their manifest, those of ``listed`` as they stand; raise SystemExit if not."""
+    whole = dict(written)
+    by_path = {f"vectors/{fields['file']}": fields for fields in rows}
+    stored = {f"vectors/{fields['file']}": fields for fields in _listed()} if listed else {}
+    for path, digest in listed.items():
+        if _hash(whole.get(path, b"")) == digest:
+            continue
+        place = CONFORMANCE / path
+        whole[path] = place.read_bytes() if place.exists() else b""
+        if _hash(whole[path]) != digest:
+            raise SystemExit(f"make_vectors: {path} is frozen, but it was changed or removed")
+        by_path[path] = stored[path]
+    groups = list(GROUPS)
+    ordered = sorted(
+        by_path.values(), key=lambda row: (groups.index(row["group"]), row["file"][:-4])
+    )
+    return whole | {"manifest.json": _manifest(ordered).encode()}
 
 
-def _sums(hashes: Mapping[str, str]) -> bytes:
-    """A line a file, as ``sha256sum --check`` reads it."""
-    return "".join(f"{hashes[path]}  {path}\n" for path in sorted(hashes)).encode("ascii")
+def _sums(made: Mapping[str, bytes]) -> bytes:
+    """A line a vector, as ``sha256sum --check`` reads it."""
+    paths = sorted(path for path in made if path.startswith("vectors/"))
+    return "".join(f"{_hash(made[path])}  {path}\n" for path in paths).encode("ascii")
 
 
 def _manifest(listed: Sequence[dict[str, Any]]) -> str:
@@ -179,6 +197,7 @@ def _manifest(listed: Sequence[dict[str, Any]]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--check", action="store_true", help="write nothing, list what differs")
+    parser.add_argument("--freeze", action="store_true", help=f"list all files in {SUMS}")
     parser.add_argument(
         "tables", nargs="*", metavar="TABLE", help="make these tables alone, such as invalid/clip"
     )
@@ -191,18 +210,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(name)
     if options.check:
         return int(bool(stale or changed))
-    if FORMAT >= (1, 0):
-        listed = listed_hashes((CONFORMANCE / SUMS).read_text("ascii"))
-        if frozen := changes_of_frozen(listed, made[SUMS].decode("ascii")):
-            raise SystemExit(f"make_vectors: frozen files would change: {', '.join(frozen)}")
     for name in stale:
         (CONFORMANCE / name).unlink()
     for name in changed:
         (CONFORMANCE / name).parent.mkdir(parents=True, exist_ok=True)
         (CONFORMANCE / name).write_bytes(made[name])
     size = sum(map(len, made.values()))
-    print(f"{len(made) - 2} vectors, {size:,} bytes with the manifest and {SUMS}")
-    print(f"SHA-256 of {SUMS}, which SPEC.md states: {_hash(made[SUMS])}")
+    print(f"{len(made) - 1} vectors, {size:,} bytes with the manifest")
+    if options.freeze:
+        (CONFORMANCE / SUMS).write_bytes(sums := _sums(made))
+        print(f"SHA-256 of {SUMS}, which SPEC.md states: {_hash(sums)}")
     return 0
 
 

@@ -117,7 +117,7 @@ def output_limit(file_bytes: int) -> int:
     return max(64 * MIB, 4096 * file_bytes)  # LIMIT-10
 
 
-FORMAT = 0, 99  # the draft of 1.0, which reads only itself
+FORMAT = 1, 0
 FORMAT_NAME = f"{FORMAT[0]}.{FORMAT[1]}"
 
 
@@ -126,7 +126,7 @@ def _check_version(needs_minor: int, record: Container) -> bool:
     words = f"it needs format {needed[0]}.{needed[1]}, but this reader knows {FORMAT_NAME}"
     if needed > FORMAT:  # HEAD-01, CLIP-23
         raise UnsupportedError(words)
-    if not needed[0] and needed != FORMAT:  # HEAD-03
+    if not needed[0]:  # HEAD-03
         raise UnsupportedError(words, hint=Hint.OLD_FORMAT)
     return True
 

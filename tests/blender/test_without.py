@@ -275,8 +275,8 @@ def test_compiled_kernels_of_several_platforms_are_in_one_wheel(tmp_path: Path) 
     linux = "mcz/kernels/compiled/fast.cpython-311-x86_64-linux-gnu.so"
     windows = "mcz/kernels/compiled/fast.cp311-win_amd64.pyd"
     checked = "mcz/kernels/checked/fast.cp311-win_amd64.pyd"
-    wheel_with(tmp_path / "mcz-0.99.0-cp311-cp311-linux_x86_64.whl", linux)
-    wheel_with(tmp_path / "mcz-0.99.0-cp311-cp311-win_amd64.whl", windows, checked)
+    wheel_with(tmp_path / "mcz-1.0.0-cp311-cp311-linux_x86_64.whl", linux)
+    wheel_with(tmp_path / "mcz-1.0.0-cp311-cp311-win_amd64.whl", windows, checked)
     (tmp_path / "numpy-1.24.4-cp311-cp311-win_amd64.whl").write_bytes(b"")
     members = zip_members(build.build_zip(build.wheels_in(tmp_path))[1])
     (wheel,) = (data for name, data in members.items() if name.startswith("wheels/mcz-"))

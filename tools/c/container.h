@@ -4,7 +4,7 @@
 #define MCZ_CONTAINER_H
 #include "numbers.h"
 
-enum { MAJOR = 0, MINOR = 99 }; /* the version of SPEC.md */
+enum { MAJOR = 1, MINOR = 0 }; /* the version of SPEC.md */
 
 /* ---- Lists, the map of ids and names ------------------------------------------------------------------------ */
 
@@ -248,7 +248,7 @@ static void hash_decoded(mcz *m, cursor *c, unsigned encoding, uint64_t size, sh
 }
 
 /* Versions: [HEAD-01], and of drafts [HEAD-03]. */
-static bool version_is_ours(unsigned major, unsigned minor) { return major == MAJOR && minor == MINOR; }
+static bool version_is_ours(unsigned major, unsigned minor) { return major == MAJOR && minor <= MINOR; }
 
 static void read_head(mcz *m, cursor *c) {
     m->head = *c;

@@ -292,7 +292,7 @@ int main(int argc, char **argv) {
             read_some(&words, f, SIZE_MAX);
             fclose(f);
         } else if (!strcmp(argv[i], "--capabilities")) {
-            puts("{\"class\": \"core\", \"codecs\": [\"raw\", \"fast\"], \"sources\": [], \"format\": \"0.99\","
+            puts("{\"class\": \"core\", \"codecs\": [\"raw\", \"fast\"], \"sources\": [], \"format\": \"1.0\","
                  " \"options\": [\"--clip\", \"--frames\", \"--joints\", \"--serve\"]}");
             free(words.p);
             return 0;

@@ -4,8 +4,8 @@ import { ByteReader } from "./bytes.js";
 import { Unsupported } from "./errors.js";
 import { profile } from "./limits.js";
 
-const MAJOR = 0;
-const MINOR = 99; // the draft of 1.0, which is read by itself alone
+const MAJOR = 1;
+const MINOR = 0;
 
 /** The version of SPEC.md that this decoder follows. */
 export const VERSION = `${MAJOR}.${MINOR}`;
@@ -22,7 +22,7 @@ export function readNeeds(reader) {
   if (major > MAJOR || (major === MAJOR && minor > MINOR)) {
     throw new Unsupported(`${reader.what}: it needs version ${major}.${minor}`);
   }
-  if (major === 0 && !(MAJOR === 0 && minor === MINOR)) {
+  if (major === 0) {
     throw new Unsupported(`${reader.what}: it needs version ${major}.${minor}, which mcz 0.9 reads`);
   }
   return major * 256 + minor;
