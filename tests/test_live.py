@@ -67,6 +67,18 @@ def live(values: np.ndarray, **params: object) -> bytes:
     return out.getvalue()
 
 
+def test_salvage_of_a_clip_that_was_cut_off() -> None:
+    values = frames(13)
+    data = live(values)
+    with mcz.open(data) as file:
+        ends = [row.stop + CHECK_SIZE for row in file.clips["live"].signals[0].rows]
+        start = file.container.directory.clips["live"].clip
+    for size in range(start.offset + start.size, len(data), 5):
+        whole = sum(end <= size for end in ends)
+        with mcz.open(data[:size], salvage=True) as file:
+            np.testing.assert_array_equal(file.clips["live"].read(), values[:whole])
+
+
 def test_numbers_of_missing_frames_come_with_the_end() -> None:
     values, out = frames(9), io.BytesIO()
     with LiveWriter(out, skeleton(), "stairs", frame_rate=Fraction(4), first_number=5) as writer:

@@ -14,9 +14,9 @@ import pytest
 
 import mcz
 from tools import make_vectors
-from tools.vectors.build.files import Vector
 from tools.figures import __main__ as figures
 from tools.figures.table import names_in, replaced
+from tools.vectors.build.files import Vector
 
 ROOT = Path(__file__).parents[1]
 REGISTRATIONS = ROOT / "conformance" / "registrations" / "README.md"

@@ -60,7 +60,7 @@ ARGUED: dict[str, str] = {
     "SALV-01": _SALVAGE + "test_regressions.py::test_salvage_of_integers",
     "SALV-02": _SALVAGE + "test_container.py::test_salvage_goes_on_behind_garbage",
     "SALV-03": _SALVAGE + "test_container.py::test_salvage_goes_on_behind_garbage",
-    "SALV-04": _SALVAGE + "test_live.py::test_every_prefix_is_truncated",
+    "SALV-04": _SALVAGE + "test_live.py::test_salvage_of_a_clip_that_was_cut_off",
     "SALV-05": _SALVAGE + "codecs/test_contract_live.py::"
     "test_a_damaged_packet_costs_the_frames_up_to_a_fresh_one",
     "ARRAY-12": "a file that breaks it has more than 4 GiB",
