@@ -63,7 +63,7 @@ def test_frozen_vectors() -> None:
 
 
 def test_frozen_vectors_stay(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """What an encoder makes today neither changes nor removes them; others follow it."""
+    """Later encoders neither change nor remove them; other vectors follow the encoder."""
     monkeypatch.setattr(make_vectors, "CONFORMANCE", tmp_path)
 
     def make(*names: str, data: bytes) -> None:
