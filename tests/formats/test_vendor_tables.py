@@ -310,6 +310,7 @@ REFUSED = {
     b"name,age\nAnn,31\nBob,32\n": "column 'name' is text beside integers",
     b"time,a\n0,1\n1,error\n2,3\n": "line 3: 'error' is not a number",
     b"time,label\n0,a\n1,b\n": "there is no column of numbers besides the times",
+    b"Devices\n100\n,,Plate\nFrame,Sub Frame,Fx\n,,N\n1,a,2\n1,b,3\n": "a sub frame is no number",
 }
 
 

@@ -180,6 +180,10 @@ def _read(data: bytes, part: _Part) -> _Read:
     n = part.n_columns
     cells = [[FRAME_NUMBER], [n], *([k] for k in range(n))]
     table = read_table(data[: part.stop], part.rows, n + 1, cells, part.separator, numbers_at=n)
+    if any(text.column == n for text in table.texts):
+        raise SourceError(
+            f"section {part.title[:40]!r}: a sub frame is no number", line=line_of(data, part.rows)
+        )
     part = _without(part, [text.column for text in table.texts])
     n = table.rows.start.shape[1] - 1
     rows = move_zeros_to_gaps(data, table.rows, (range(part.n_columns),))
