@@ -10,6 +10,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -160,6 +161,18 @@ def test_machine_code_comes_from_the_package_alone(
     }
     is_plain, sizes, warned = installation.run(**paths)
     assert (is_plain, sizes, len(warned)) == (True, SIZES, 1)
+
+
+def test_a_kernel_that_its_unit_lacks_runs_as_plain_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its module has another name since the unit was compiled."""
+
+    def doubled(value: int) -> int:
+        return 2 * value
+
+    monkeypatch.setitem(UNIT_OF, __name__, UNIT)
+    monkeypatch.setattr(kernels, "_unit", lambda name: (ModuleType(name), ""))
+    with pytest.warns(RuntimeWarning, match="__doubled is newer than its compiled form"):
+        assert kernels.compiled_form(doubled)(4) == 8
 
 
 @pytest.mark.parametrize("word", ["fast", "Compiled", "checked/../compiled", "..", "/"])

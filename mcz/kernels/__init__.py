@@ -67,9 +67,12 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
 def compiled_form(function: Callable[P, T]) -> Callable[P, T]:
     """The compiled form of ``function``; without one, plain Python that warns once."""
     unit, fault = _unit(UNIT_OF[function.__module__])
-    if unit is not None:
-        name = f"{function.__module__.removeprefix('mcz.').replace('.', '_')}__{function.__name__}"
-        return cast(Callable[P, T], getattr(unit, f"call_{name}"))
+    name = f"{function.__module__.removeprefix('mcz.').replace('.', '_')}__{function.__name__}"
+    compiled = getattr(unit, f"call_{name}", None)
+    if compiled is not None:
+        return cast(Callable[P, T], compiled)
+    if unit is not None:  # it was compiled before the kernel was written, or had another module
+        fault = f"{name} is newer than its compiled form; build the kernels again"
 
     def interpret(*args: P.args, **kwargs: P.kwargs) -> T:
         import numpy as np
