@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -39,7 +40,7 @@ from mcz.files.reading.report import info
 from mcz.files.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.motions import skeleton, smooth
-from tests.repair import parts_of, use, with_packets
+from tests.repair import flip_bit, parts_of, use, with_packets
 
 ROOT = Path(mcz.__file__).parent.parent
 
@@ -277,6 +278,22 @@ def with_body(data: bytes, frame: int, change: Callable[[bytes], bytes]) -> byte
         return replace(packet, body=change(packet.body)) if number == frame else packet
 
     return with_packets(data, change_packet)
+
+
+def test_bodies_flipped_and_cut_behind_repaired_checks() -> None:
+    data = live(frames(13))
+    for frame in range(13):
+        for at in range(1, 160, 8):
+            for change in (
+                lambda body, at=at: flip_bit(body, at // 8 % len(body), at % 8) if body else b"x",
+                lambda body, at=at: body[: at % max(1, len(body))] if body else b"\0",
+            ):
+                bad = with_body(data, frame, change)
+                for how in (False, True):
+                    with suppress(mcz.MczError):
+                        use(bad, salvage=how)
+                with pytest.raises(mcz.MczError):
+                    list(live_frames(io.BytesIO(bad)))
 
 
 def test_a_lost_end_packet_costs_no_frame() -> None:

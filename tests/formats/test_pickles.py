@@ -21,6 +21,7 @@ import mcz
 from mcz.errors import SourceError
 from mcz.model.motion import Motion
 from mcz.sources import FORMATS, arrays_of, format_of, likely_formats
+from tests.amounts import some
 from tools.vectors.build.array_files import floats
 from tools.vectors.build.pickle_files import joblib_file, tensor_file
 
@@ -45,6 +46,14 @@ def read(data: bytes) -> Motion:
     motion: Motion = FORMATS["pickle"].read(data, "walk")
     assert FORMATS["pickle"].write(motion) == data
     return motion
+
+
+def back_or_refused(data: bytes) -> Motion | None:
+    try:
+        return read(data)
+    except (mcz.SourceError, mcz.LimitError) as error:
+        assert "\n" not in str(error)
+        return None
 
 
 def part_of(motion: Motion, first: int, stop: int) -> Any:
@@ -396,6 +405,23 @@ def test_bombs_take_what_their_bytes_earn(name: str) -> None:
     finally:
         tracemalloc.stop()
     assert peak < LIMIT + 150 * len(BOMBS[name])
+
+
+def test_damaged_files_are_restored_or_refused() -> None:
+    """Prefixes, bytes changed in turn, and bytes left out, of every protocol."""
+    clip = {"fps": 30, "dof_pos": floats(4, 2), "root_pos": floats(4, 3), "dof_names": ["a", "b"]}
+    files = [pickle.dumps(clip, protocol) for protocol in (0, 2, 4, 5)]
+    files.append(joblib_file({"a": clip}))
+    files.append(pickle.dumps({"a": clip, "b": clip | {"dof_pos": floats(3, 2)}}, 4))
+    n_tried = 0
+    for data in files:
+        for at in some(range(len(data)), 3):
+            back_or_refused(data[:at])
+            back_or_refused(data[:at] + data[at + 1 :])
+            for bit in (0, 7):
+                back_or_refused(data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :])
+            n_tried += 4
+    assert n_tried > 700
 
 
 def test_opcodes_are_bounded() -> None:
