@@ -44,7 +44,6 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.posewave.order_kernels",
     ),
     "rows": (
-        "mcz.codecs.posewave.course_kernels",
         "mcz.codecs.posewave.displacement_kernels",
         "mcz.codecs.posewave.head_kernels",
         "mcz.codecs.posewave.model_kernels",

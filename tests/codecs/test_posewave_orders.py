@@ -93,11 +93,11 @@ def turning_person(unit: str = "deg", n_frames: int = 3000) -> tuple[Skeleton, F
 @pytest.mark.parametrize("unit", ["deg", "rad"])
 def test_the_calm_order_is_found(unit: str) -> None:
     skeleton, values = turning_person(unit)
-    assert SEQUENCES[choose_orders(source_of(skeleton, values))[0] - 1][0] == 1
-    assert choose_orders(source_of(skeleton, values * [1, 1, 0, 1])) == {}
-    assert choose_orders(source_of(skeleton, values[:0])) == {}
-    assert choose_orders(source_of(skeleton, values * [1, 1, 1e200, 1])) == {}
-    assert choose_orders(source_of(replace(skeleton, angle_unit=""), values)) == {}
+    assert SEQUENCES[choose_orders("posewave", source_of(skeleton, values))[0] - 1][0] == 1
+    assert choose_orders("posewave", source_of(skeleton, values * [1, 1, 0, 1])) == {}
+    assert choose_orders("posewave", source_of(skeleton, values[:0])) == {}
+    assert choose_orders("posewave", source_of(skeleton, values * [1, 1, 1e200, 1])) == {}
+    assert choose_orders("posewave", source_of(replace(skeleton, angle_unit=""), values)) == {}
 
 
 def test_codec() -> None:
@@ -136,7 +136,7 @@ def test_vectors_are_chosen() -> None:
     swings = 1.2 * np.stack([np.cos(t), np.sin(t), np.sin(1.7 * t)], axis=1)
     angles = Rotation.from_rotvec(swings).as_euler("ZXY", degrees=True)
     values = unwrap(np.tile(np.insert(angles, 1, t, axis=1), (1, 3)), skeleton)
-    codes = choose_orders(source_of(skeleton, values))
+    codes = choose_orders("posewave", source_of(skeleton, values))
     assert {joint: codes.get(joint) for joint in (1, 2)} == vector_codes(skeleton)
     assert codes.get(0) != VECTOR_CODE
     source = source_of(skeleton, values)

@@ -35,8 +35,7 @@ from mcz.codecs.posewave.header import (
     parse_posewave_header,
 )
 from mcz.codecs.posewave.model import number_of
-from mcz.codecs.posewave.order_choice import choose_orders
-from mcz.codecs.posewave.orders import N_NOTES, Orders
+from mcz.codecs.posewave.orders import N_NOTES, Orders, choose_orders
 from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
@@ -122,7 +121,7 @@ def choose(source: SignalSource, params: Params) -> Choice:
     if like:
         vectors, fields["orders"] = like.flags & VECTORS, like.orders
     else:
-        vectors, fields["orders"] = order_settings(choose_orders(source, exact), skeleton)
+        vectors, fields["orders"] = order_settings(choose_orders(NAME, source, exact), skeleton)
     fields["flags"] |= vectors
     if params.get("weights") is not None:
         fields["weights"] = [code_of(float(weight)) for weight in params["weights"]]

@@ -9,24 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
-from types import ModuleType
-from typing import TYPE_CHECKING
 from warnings import warn
 
 import numpy as np
 
+from mcz.codecs.coding import mixing
 from mcz.codecs.coding.mixing import rate_table, squash_table, stretch_table
+from mcz.codecs.posewave import contact_kernels, displacement_kernels
 from mcz.codecs.posewave.contact_plan import START_UNITS, Contacts, HeldPoints
+from mcz.codecs.posewave.displacement_kernels import Leader, Track
 from mcz.codecs.posewave.row_coder import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan
 from mcz.errors import ContactWarning, FormatError, MotionError
 from mcz.model.motion import Skeleton
 from mcz.model.types import Floats
-
-if TYPE_CHECKING:  # compiled kernels, imported on first use
-    from mcz.codecs.posewave.displacement_kernels import Leader, Track
-
 
 USUAL = 0.25, -0.125, 0.0625, 0.0, 0.6875, 0.125, -0.25, 0.75, 0.1875
 # By class of a mean magnitude: probability that one is not 0, and that it is greater still.
@@ -43,37 +39,21 @@ CERTAIN = 8  # initial count of observations
 WEIGHT = 26214  # of each opinion, in 2^-16
 
 
-@cache
-def _kernels() -> ModuleType:
-    from mcz.codecs.posewave import contact_kernels
-
-    return contact_kernels
-
-
-@cache
-def _coding() -> ModuleType:
-    from mcz.codecs.posewave import displacement_kernels
-
-    return displacement_kernels
-
-
-@cache
-def _mixing() -> ModuleType:
-    from mcz.codecs.coding import mixing
-
-    return mixing
-
-
 class Coder:
     """Codes contacts after the rows of a stream, with contexts of its own."""
 
     def __init__(self, stream: Stream) -> None:
-        coding, mixing = _coding(), _mixing()
         self.stream = stream
-        models = np.tile(np.array([32768, 0], np.int64), coding.N_CONTEXTS)
-        likely = np.repeat(np.array([MORE_PROBABILITY], np.int64).T, coding.N_BITS, axis=1)
+        models = np.tile(np.array([32768, 0], np.int64), displacement_kernels.N_CONTEXTS)
+        likely = np.repeat(
+            np.array([MORE_PROBABILITY], np.int64).T, displacement_kernels.N_BITS, axis=1
+        )
         likely[:, 0] = SOME
-        for first in (coding.C_FAST, coding.C_SLOW, coding.C_OTHER):
+        for first in (
+            displacement_kernels.C_FAST,
+            displacement_kernels.C_SLOW,
+            displacement_kernels.C_OTHER,
+        ):
             own = slice(2 * first, 2 * (first + likely.size))
             models[own] = np.stack([likely.ravel(), np.full(likely.size, CERTAIN)], axis=1).ravel()
         self.state = np.zeros(mixing.MODELS, np.int64)
@@ -83,8 +63,8 @@ class Coder:
         self.state[mixing.WEIGHTS : mixing.MODELS] = WEIGHT
         self.state = np.concatenate([self.state, models])
         self.state[: mixing.SQUASH] = stream.coder[: mixing.SQUASH]
-        shape = coding.N_FEATURES
-        self.learner = coding.Learner(
+        shape = displacement_kernels.N_FEATURES
+        self.learner = displacement_kernels.Learner(
             squares=np.zeros((3, shape, shape)),
             products=np.zeros((3, shape)),
             weights=np.tile(np.array(USUAL), (3, 1)),
@@ -106,11 +86,11 @@ class Coder:
     ) -> int:
         """Code the contacts of a point in place; -1, or the frame of one that is impossible."""
         args = self.learner, places, step, track, leader, target, radii
-        return int(_coding().code_point(self.state, self.stream.data, *args))
+        return int(displacement_kernels.code_point(self.state, self.stream.data, *args))
 
     def close(self) -> None:
         """Code whether the stream goes on or ends."""
-        self.stream.coder[: _mixing().SQUASH] = self.state[: _mixing().SQUASH]
+        self.stream.coder[: mixing.SQUASH] = self.state[: mixing.SQUASH]
 
 
 class Corrections:
@@ -123,7 +103,7 @@ class Corrections:
 
     def __init__(self, contacts: Contacts, plan: Plan, points: HeldPoints, values: Floats) -> None:
         self.contacts, self.plan, self.held, self.values = contacts, plan, points, values
-        self.lanes = _kernels().lanes_of(plan, 1)
+        self.lanes = contact_kernels.lanes_of(plan, 1)
         self.places = self.positions_of(values)
         self.stands = np.zeros(self.places.shape[:2], np.int64)
         self.starts = np.zeros(self.places.shape, np.int64)
@@ -134,31 +114,30 @@ class Corrections:
     def positions_of(self, values: Floats) -> Floats:
         """Positions of the points in frames ``values``, (n_points, n_frames, 3)."""
         positions = np.empty((len(self.contacts.joints), len(values), 3))
-        _kernels().place_points(self.plan, self.held, self.lanes, values, positions)
+        contact_kernels.place_points(self.plan, self.held, self.lanes, values, positions)
         return positions
 
     def track(self, point: int) -> Track:
-        result: Track = _coding().Track(self.stands[point], self.starts[point], self.moves[point])
-        return result
+        return Track(self.stands[point], self.starts[point], self.moves[point])
 
     def code(self, coder: Coder, point: int, target: Floats, radii: Floats) -> int:
         """Code one point, as ``Coder.point``."""
         contacts, places = self.contacts, self.places[point]
         step, followed = contacts.steps[point], contacts.follows[point] - 1
-        leader = _coding().Leader(np.zeros(len(places), np.int64), self.shifts[0])
+        leader = Leader(np.zeros(len(places), np.int64), self.shifts[0])
         if followed >= 0:
-            leader = _coding().Leader(self.stands[followed], self.shifts[followed])
+            leader = Leader(self.stands[followed], self.shifts[followed])
         padded = np.pad(places, ((1, 1), (0, 0)), "edge")
         fault = coder.point(padded, step, self.track(point), leader, target, radii)
         goal = self.shifts[point], self.active[point]
         goal[0][:], goal[1][:] = 0.0, 0
-        _kernels().set_shifts(places, self.track(point), step, contacts.ramp, *goal)
+        contact_kernels.set_shifts(places, self.track(point), step, contacts.ramp, *goal)
         return fault
 
     def correct(self) -> None:
         """Move the points to their places by changing the values."""
         args = self.held, self.lanes, self.values, self.active, self.shifts, self.contacts.rounds
-        _kernels().correct_poses(self.plan, *args)
+        contact_kernels.correct_poses(self.plan, *args)
 
 
 def room_of_contacts(contacts: Contacts | None, n_frames: int) -> int:

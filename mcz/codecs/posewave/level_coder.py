@@ -8,36 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy, deepcopy
-from functools import cache
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from mcz.codecs.posewave import metric_kernels
 from mcz.codecs.posewave.contact_plan import Contacts, HeldPoints, make_held_points
 from mcz.codecs.posewave.header import Header
+from mcz.codecs.posewave.metric_kernels import Course
+from mcz.codecs.posewave.pose_kernels import Lanes, lanes_of
 from mcz.codecs.posewave.skeleton_plan import Plan, bounded_regularization, make_plan
 from mcz.codecs.transforms import lifting
 from mcz.model.motion import Skeleton
 from mcz.model.types import Bools, Floats, Ints
 
-if TYPE_CHECKING:  # modules of kernels are imported on use
-    from mcz.codecs.posewave.metric_kernels import Course
-    from mcz.codecs.posewave.pose_kernels import Lanes
-
 Code = Callable[[Floats], Floats]  # rows to code -> rows as a decoder has them
-CourseMetric: TypeAlias = "tuple[Plan, Lanes, Course]"
+CourseMetric: TypeAlias = tuple[Plan, Lanes, Course]
 # of the rows, their steps, and the approximations to fill
-CodeCourse: TypeAlias = "Callable[[CourseMetric, Floats, Floats, Floats], None]"
+CodeCourse: TypeAlias = Callable[[CourseMetric, Floats, Floats, Floats], None]
 
 BLOCK_ENTRIES = 2**21  # numbers of factors that are in memory at a time
-
-
-@cache
-def kernels() -> ModuleType:
-    from mcz.codecs.posewave import metric_kernels
-
-    return metric_kernels
 
 
 def midpoints(approx: Floats, n_rows: int) -> Floats:
@@ -60,8 +50,8 @@ class LevelCoder:
         self.metric = self._metric_of(0)  # of the present level
         self.poses = self.approx = np.zeros((0, len(self.kept)))
         self._factors: Floats | None = None  # of all poses, where both ways through them are due
-        self.lanes = kernels().lanes_of(self.metric.plan, 1)
-        self.course = kernels().course_of(first, self.kept, header.greatest[self.kept])
+        self.lanes = lanes_of(self.metric.plan, 1)
+        self.course = metric_kernels.course_of(first, self.kept, header.greatest[self.kept])
 
     def copy(self) -> LevelCoder:
         """Return an independent copy."""
@@ -101,7 +91,7 @@ class LevelCoder:
         """Level 0 from all of its rows in the metric, in steps."""
         self.approx = np.empty((len(rows), len(self.kept)))
         scaled = rows * self.steps(level, exponents)
-        kernels().take_rows(self.metric.plan, self.lanes, self.course, scaled, self.approx)
+        metric_kernels.take_rows(self.metric.plan, self.lanes, self.course, scaled, self.approx)
 
     def code_details(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
         """Encode a level of details, all rows at once; ``code`` returns the decoded rows."""
@@ -231,15 +221,15 @@ class Metric:
         """Factors of ``poses``, (n_poses, n_kept): (n_poses, n_entries)."""
         values = np.repeat(self.still[None], len(poses), axis=0)
         values[:, self.kept] = poses
-        result: Floats = kernels().factor(self.plan, values)
+        result: Floats = metric_kernels.factor(self.plan, values)
         return result
 
     def to_metric(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """Differences of values, (n_rows, n_kept), in the metric, each at the pose ``which``."""
-        result: Floats = kernels().into_metric(self.plan, factors, rows, which)
+        result: Floats = metric_kernels.into_metric(self.plan, factors, rows, which)
         return result
 
     def from_metric(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """The inverse of ``into``."""
-        result: Floats = kernels().out_of_metric(self.plan, factors, rows, which)
+        result: Floats = metric_kernels.out_of_metric(self.plan, factors, rows, which)
         return result

@@ -6,15 +6,18 @@ its other two turn fast although the joint does not; in another order all three 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+import math
+from collections.abc import Container, Iterator, Mapping
 from itertools import pairwise
-from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 
+from mcz.codecs.contract import SignalSource
+from mcz.codecs.posewave import order_kernels
 from mcz.codecs.posewave.trigonometry import BEYOND, RULES, VECTOR
+from mcz.codecs.segments import skeleton_of
+from mcz.codecs.source_readers import FrameReader
 from mcz.errors import FormatError, MotionError
 from mcz.kinematics.angles import FULL_TURN
 from mcz.model.motion import QUATERNION_KINDS, ROTATION_KINDS, VECTOR_KINDS, Joint, Skeleton
@@ -44,13 +47,6 @@ class ReorderedJoint(NamedTuple):
     columns: Ints
     coded: Ints
     own: Ints
-
-
-@cache
-def kernels() -> ModuleType:
-    from mcz.codecs.posewave import order_kernels
-
-    return order_kernels
 
 
 def own_sequence(joint: Joint, skeleton: Skeleton) -> AxisSequence | None:
@@ -111,10 +107,10 @@ class Orders:
                 )
             if place.coded[0] == VECTOR:
                 angles = np.ascontiguousarray(values[:, place.columns])
-                kernels().follow_vectors(angles, place.own, self.full, self.rule)
+                order_kernels.follow_vectors(angles, place.own, self.full, self.rule)
             else:
                 angles = self._reorder_axes(values, place, place.own, place.coded)
-                kernels().follow_angles(angles, place.coded, self.full, nothing)
+                order_kernels.follow_angles(angles, place.coded, self.full, nothing)
             coded[:, place.columns] = angles
         return coded
 
@@ -126,9 +122,11 @@ class Orders:
         for index, place in enumerate(self.places):
             angles = self._reorder_axes(coded, place, place.coded, place.own)
             given, own = source[:, place.columns], notes[:, index]
-            kernels().choose_switches(angles, given, place.own, self.full, PRICE * self.full, own)
-            kernels().follow_angles(angles, place.own, self.full, own)
-            kernels().choose_turns(angles, given, self.full, own)
+            order_kernels.choose_switches(
+                angles, given, place.own, self.full, PRICE * self.full, own
+            )
+            order_kernels.follow_angles(angles, place.own, self.full, own)
+            order_kernels.choose_turns(angles, given, self.full, own)
         return _build_notes(notes), self.values(coded, notes)
 
     def read_notes(self, stream: bytes, n_frames: int, where: str) -> tuple[Ints, bytes]:
@@ -141,7 +139,7 @@ class Orders:
         values = coded.copy() if self.places else coded
         for index, place in enumerate(self.places):
             angles = self._reorder_axes(coded, place, place.coded, place.own)
-            kernels().follow_angles(angles, place.own, self.full, notes[:, index])
+            order_kernels.follow_angles(angles, place.own, self.full, notes[:, index])
             values[:, place.columns] = angles
         return values
 
@@ -149,7 +147,7 @@ class Orders:
         self, values: Floats, place: ReorderedJoint, old_order: Ints, order: Ints
     ) -> Floats:
         angles = np.ascontiguousarray(values[:, place.columns])
-        kernels().reorder_axes(angles, old_order, order, self.rule)
+        order_kernels.reorder_axes(angles, old_order, order, self.rule)
         return angles
 
 
@@ -188,3 +186,60 @@ def _read_notes(stream: bytes, notes: Ints, where: str) -> bytes:
                 raise FormatError(f"{turns} turns are out of range", where=where)
             flat[number] = (turns >> 1) ^ -(turns & 1)  # PWAVE-24
     return stream[at:]
+
+
+SOURCE_ORDER = 0  # code of the order of the source
+RUNS, RUN_FRAMES = 8, 128  # sampled runs of a long clip
+DUE = 0.985  # an order is chosen if its score is below this share of the source's
+VECTOR_SHARE = 0.96  # of their score: vectors suit the metric better than angles
+STILL = 1e-4  # of a turn: a joint whose steps change by less keeps its order
+GREATEST = 2.0**20  # of an angle, whose sine is exact enough in any unit
+
+
+def choose_orders(name: str, source: SignalSource, exact: Container[int] = ()) -> dict[int, int]:
+    """Choose codes of orders by joint, of joints that are calmer in another than the source's.
+
+    Joints with ``exact`` channels keep the source's order. Angles that jump or turn fast cost
+    bytes: bits by the logarithms of their second differences, approximated by roots.
+    """
+    skeleton = skeleton_of(name, source.layout)
+    joints = [
+        index
+        for index, joint in enumerate(skeleton.joints)
+        if own_sequence(joint, skeleton) is not None
+        and not any(channel in exact for channel in skeleton.columns(index))
+    ]
+    if not joints:
+        return {}
+    columns = np.array([columns_by_axis(skeleton, index) for index in joints])
+    scores, highest, n_rows = np.zeros((1 + N_ORDERS, len(joints))), np.zeros(len(joints)), 0
+    roots = [skeleton.joints[joint].parent < 0 for joint in joints]
+    orders = [
+        Orders(dict.fromkeys(joints, code) if code != SOURCE_ORDER else {}, skeleton)
+        for code in range(1 + N_ORDERS)
+    ]
+    for values in _runs(name, source):
+        n_rows += len(values)
+        highest = np.maximum(highest, np.abs(values[:, columns]).max(axis=(0, 2), initial=0.0))
+        values = np.clip(values, -GREATEST, GREATEST)
+        for code, order in enumerate(orders):
+            coded = order.to_coded_order(values)[:, columns]
+            scores[code] += np.sqrt(np.abs(np.diff(coded, 2, axis=0))).sum(axis=(0, 2))
+    scores[VECTOR_CODE] = np.where(roots, math.inf, VECTOR_SHARE * scores[VECTOR_CODE])
+    full = orders[SOURCE_ORDER].full
+    moves = (scores[SOURCE_ORDER] > np.sqrt(STILL * full) * n_rows) & (highest < GREATEST)
+    worth = moves & (scores.min(axis=0) < DUE * scores[SOURCE_ORDER])
+    best = np.where(worth, scores.argmin(axis=0), SOURCE_ORDER).tolist()
+    return {joint: code for joint, code in zip(joints, best, strict=True) if code != SOURCE_ORDER}
+
+
+def _runs(name: str, source: SignalSource) -> Iterator[Floats]:
+    """Runs of frames, evenly spread; the whole of a short clip."""
+    n_frames = source.layout.n_frames
+    starts, length = np.zeros(1, np.int64), n_frames
+    if n_frames > RUNS * RUN_FRAMES:
+        starts, length = np.linspace(0, n_frames - RUN_FRAMES, RUNS).astype(np.int64), RUN_FRAMES
+    for start in starts.tolist():
+        reader = FrameReader(name, source)
+        reader.at = start
+        yield reader.next(start + length)

@@ -6,12 +6,12 @@ SPEC.md, "Codec 3: posewave", is normative.
 from __future__ import annotations
 
 from copy import copy, deepcopy
-from functools import cache
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mcz.codecs.coding import mixing
+from mcz.codecs.posewave import head_kernels, model_kernels
 from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.model import Start, make_model, new_rows, no_rows, start_coder
 from mcz.codecs.posewave.model_state import N_SMALL, LevelRows
@@ -25,34 +25,6 @@ TOO_LARGE = f"{NAME}: a coefficient exceeds 2^29 quantizer steps"
 CARRIED = 40.0  # rows at most that the coarser levels count for
 
 
-@cache
-def _model() -> ModuleType:
-    from mcz.codecs.posewave import model_kernels
-
-    return model_kernels
-
-
-@cache
-def _course() -> ModuleType:
-    from mcz.codecs.posewave import course_kernels
-
-    return course_kernels
-
-
-@cache
-def _head() -> ModuleType:
-    from mcz.codecs.posewave import head_kernels
-
-    return head_kernels
-
-
-@cache
-def _coding() -> ModuleType:
-    from mcz.codecs.coding import mixing
-
-    return mixing
-
-
 class Stream:
     """The bytes of a level, written or read; ``coder`` is passed from one to the next."""
 
@@ -61,10 +33,10 @@ class Stream:
         self.data = (
             np.zeros(size, np.uint8) if given is None else np.frombuffer(given, np.uint8).copy()
         )
-        _coding().start(coder, self.data, 1 if given is None else 0)
+        mixing.start(coder, self.data, 1 if given is None else 0)
 
     def finish(self) -> bytes:
-        used = int(_coding().finish(self.coder, self.data))
+        used = int(mixing.finish(self.coder, self.data))
         if used > len(self.data):
             raise AssertionError(f"{used} bytes in {len(self.data)}")
         return self.data[:used].tobytes()
@@ -72,7 +44,7 @@ class Stream:
     @property
     def is_whole(self) -> bool:
         """True if every byte was needed, after the last bit was decoded."""
-        return bool(_coding().coded_size(self.coder) == len(self.data))
+        return bool(mixing.coded_size(self.coder) == len(self.data))
 
 
 def fresh_coder(start: Start) -> Ints:
@@ -82,7 +54,7 @@ def fresh_coder(start: Start) -> Ints:
 
 def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: str) -> None:
     """Code the mask ``kept`` of channels and the ``numbers`` of all, in place."""
-    if _head().code_head(stream.coder, stream.data, N_SMALL, classes, kept, numbers):
+    if head_kernels.code_head(stream.coder, stream.data, N_SMALL, classes, kept, numbers):
         raise FormatError("a first value exceeds 40 bits", where=where)
 
 
@@ -184,7 +156,7 @@ class RowCoder:
     def encode(self, rate_weight: float, rows: Floats) -> Floats:
         """All rows of coefficients, in steps, as a decoder will have them."""
         self._rows.y[self._n_known :] = rows
-        if not (np.abs(rows) < _course().MOST_WANTED).all():  # NaN too
+        if not (np.abs(rows) < model_kernels.MOST_WANTED).all():  # NaN too
             raise MotionError(TOO_LARGE)
         self._run(rate_weight)
         return self._decoded()
@@ -203,7 +175,7 @@ class RowCoder:
         """
         if not self.n_kept:
             return
-        fault = _course().code_course(
+        fault = model_kernels.code_course(
             *metric,
             rows,
             steps,
@@ -216,7 +188,7 @@ class RowCoder:
             rate_weight,
             *self._flags,
         )
-        if fault == _course().TOO_LARGE:
+        if fault == model_kernels.TOO_LARGE:
             raise MotionError(TOO_LARGE)
         self._check(fault)
 
@@ -237,7 +209,7 @@ class RowCoder:
     def _run(self, rate_weight: float) -> None:
         if not self.n_kept:
             return
-        fault = _model().code_rows(
+        fault = model_kernels.code_rows(
             self.model,
             self.stream.data,
             self._rows,
