@@ -98,6 +98,16 @@ def test_a_changed_payload_is_read_or_refused(records: list[Record], data: st.Da
             parse_meta(bytes(bad), CHUNK, 0)
 
 
+def test_a_long_value_that_deflates_well_is_read_again(archive: Path) -> None:
+    text = "a note. " * 20_000  # longer than twice the file  (LIMIT-17)
+    mcz.set_metadata(archive, {"": {"x-note": text}, "walk": {"description": text}})
+    assert mcz.verify(archive) == []
+    found = metadata(archive)
+    assert (found[""]["x-note"], found["walk"]["description"]) == (text, text)
+    mcz.delete_clips(archive, ["walk.c3d"])
+    assert metadata(archive)["walk"]["description"] == text
+
+
 def test_the_last_one_wins(archive: Path) -> None:
     append_metadata(
         archive,

@@ -57,21 +57,31 @@ def merge_records(name: str, records: Iterable[Record]) -> Record:
 
 
 def build_metas(
-    records: Sequence[Record], *, short: bool = False, profile: Profile = BASE
+    records: Sequence[Record],
+    *,
+    short: bool = False,
+    profile: Profile = BASE,
+    file_bytes: int = 0,
 ) -> Iterator[bytes]:
-    """The payloads of META chunks with ``records``, each of about 1 MiB at most."""
+    """The payloads of META chunks with ``records``, each of about 1 MiB at most.
+
+    ``file_bytes``: the bytes of the file before them.
+    """
     content = bytearray()
     for record in records:
         content += record_bytes(record)
         if len(content) >= min(MIB, profile.coded_bytes):
-            yield _payload(bytes(content), short, profile)
+            yield _payload(bytes(content), short, profile, file_bytes)
             content.clear()
     if content:
-        yield _payload(bytes(content), short, profile)
+        yield _payload(bytes(content), short, profile, file_bytes)
 
 
-def _payload(content: bytes, short: bool, profile: Profile) -> bytes:
+def _payload(content: bytes, short: bool, profile: Profile, file_bytes: int) -> bytes:
     flags, data = encode_smallest(content, short=short, plain=profile.is_plain)
+    # a long value that deflates well would inflate to more than readers of a small file accept
+    if len(content) > metadata_limit(file_bytes + len(data)):
+        flags, data = payloads.STORED, content
     return build(payloads.Meta(flags=flags, size=len(content), data=data), "META")
 
 
