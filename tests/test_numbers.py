@@ -9,6 +9,7 @@ import subprocess
 import sys
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mcz import FormatError, SourceError
+from mcz.kernels import PACKAGE
 from mcz.model.numbers import (
     Grid,
     GridFlag,
@@ -578,3 +580,16 @@ def test_no_tokens_have_a_grid() -> None:
     plain = dict(os.environ, MCZ_LOOPS="interpreted")
     ran = subprocess.run([sys.executable, "-c", code], env=plain, capture_output=True, check=True)
     assert ran.stdout.split() == [b"FIXED"]
+
+
+def test_plain_kernels_compute_as_silently_as_compiled_ones(tmp_path: Path) -> None:
+    """In a process of its own; -0 is told from 0 by a division by zero."""
+    (tmp_path / "zeros.csv").write_bytes(b"x,y\n-0.0,1\n0,2\n")
+    code = "import mcz; mcz.encode('zeros.csv', 'zeros.mcz'); "
+    code += "print(next(iter(mcz.open('zeros.mcz'))).source_bytes().decode(), end='')"
+    plain = dict(os.environ, MCZ_LOOPS="interpreted", PYTHONPATH=str(PACKAGE.parent))
+    command = [sys.executable, "-W", "error::RuntimeWarning", "-c", code]
+    ran = subprocess.run(
+        command, cwd=tmp_path, env=plain, capture_output=True, text=True, check=False
+    )
+    assert (ran.stdout, ran.stderr) == ("x,y\n-0.0,1\n0,2\n", "")

@@ -278,9 +278,7 @@ class Writer:
         self._between_clips("META")
         if records and not self.directory.clips:
             raise MotionError("metadata need a clip, and the file has none")  # META-01
-        metas = build_metas(
-            records, short=self.short, profile=self.profile, file_bytes=self.offset
-        )
+        metas = build_metas(records, short=self.short, profile=self.profile, file_bytes=self.offset)
         for payload in metas:
             self.ancillary(ChunkType.META, payload)
 

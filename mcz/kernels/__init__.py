@@ -51,7 +51,7 @@ SLOW = "kernels run as plain Python, 50 to 500 times slower: "
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """``function`` as Python calls it, compiled if possible; the first call loads its unit."""
     if MODE == INTERPRETED:
-        return function
+        return _interpreted(function)
     chosen: Callable[P, T] | None = None
 
     @wraps(function)
@@ -74,10 +74,22 @@ def compiled_form(function: Callable[P, T]) -> Callable[P, T]:
     if unit is not None:  # it was compiled before the kernel was written, or had another module
         fault = f"{name} is newer than its compiled form; build the kernels again"
 
+    interpret = _interpreted(function)
+
+    def warn_and_interpret(*args: P.args, **kwargs: P.kwargs) -> T:
+        _warn(SLOW + fault)
+        return interpret(*args, **kwargs)
+
+    return warn_and_interpret
+
+
+def _interpreted(function: Callable[P, T]) -> Callable[P, T]:
+    """``function`` as plain Python, with the silent arithmetic of compiled kernels."""
+
+    @wraps(function)
     def interpret(*args: P.args, **kwargs: P.kwargs) -> T:
         import numpy as np
 
-        _warn(SLOW + fault)
         with np.errstate(all="ignore"):  # compiled, numbers wrap and overflow silently
             return function(*args, **kwargs)
 
