@@ -55,7 +55,9 @@ PYTHON_HINTS: Words = {
     Hint.LARGE: "profile='large' allows more",
     Hint.MAX_DECODED: "raise it with max_decoded",
     Hint.NAME_CODEC: "name a codec to re-encode it",
-    Hint.OLD_FORMAT: "read it with version 0.9 of mcz, or convert it with tools/migrate_0_9",
+    Hint.OLD_FORMAT: (
+        "read it with the version of mcz that wrote it; tools/migrate_0_9 converts files of 0.9"
+    ),
     Hint.PAGE: "select clips, choose a lossy codec, or allow more bytes",
     Hint.PORTABLE_NAMES: "names='portable' writes both",
     Hint.RATE: "set the frame rate (rate=)",

@@ -195,8 +195,12 @@ def test_delete_asks_for_what_is_there(files: tuple[Path, Path]) -> None:
     before = a.read_bytes()
     with pytest.raises(mcz.OptionError, match="did you mean 'walk'"):
         mcz.delete_clips(a, ["wakl"])
-    with pytest.raises(mcz.OptionError, match="nothing to delete"):
+    with pytest.raises(mcz.OptionError, match="nothing to delete; name clips or give where"):
         mcz.delete_clips(a)
+    with pytest.raises(
+        mcz.OptionError, match="nothing to delete; no clip matches 'n_frames > 9e9'"
+    ):
+        mcz.delete_clips(a, where="n_frames > 9e9")
     with pytest.raises(mcz.ExistsError):
         mcz.delete_clips(a, "walk", output=a.parent / "b.mcz")
     with pytest.raises(mcz.OptionError, match="the input itself"):

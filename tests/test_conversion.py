@@ -18,6 +18,7 @@ from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skelet
 from mcz.exchange.conversion import converted_files
 from mcz.kinematics.points import point_names, positions, reach
 from mcz.kinematics.rotations import ORDERS, euler_angles, euler_order
+from mcz.model.skeleton import QUATERNION_KINDS
 from mcz.sources import FORMATS
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import skeletons, values_for
@@ -254,6 +255,11 @@ def test_refusals() -> None:
     for to in ("bvh", "c3d"):
         with pytest.raises(MotionError, match="plain scalars"):
             mcz.convert(flat, to)
+    turning = Joint("hips", channels=tuple(Channel(kind) for kind in QUATERNION_KINDS))
+    gap = Motion(Skeleton((turning,)), (Signal(np.full((1, 4), np.nan)),), Fraction(1))
+    for to in ("bvh", "amc"):
+        with pytest.raises(MotionError, match=f"{to.upper()} cannot omit values"):
+            mcz.convert(gap, to)
     two = replace(bvh.skeleton, joints=(*bvh.skeleton.joints, Joint("prop")))
     with pytest.raises(MotionError, match=r"one root, .* has 2"):
         mcz.convert(replace(bvh, skeleton=two), "amc")

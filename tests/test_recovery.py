@@ -304,6 +304,19 @@ def test_protecting_twice_does_nothing(archive: bytes, tmp_path: Path) -> None:
             mcz.protect(path, wrong)
 
 
+@pytest.mark.parametrize("anew", [False, True])
+def test_bad_bytes_are_not_protected_as_good_ones(
+    archive: bytes, tmp_path: Path, anew: bool
+) -> None:
+    bad = bytearray(archive)
+    bad[archive.index(b"DATA") + 40] ^= 1
+    path = tmp_path / "a.mcz"
+    path.write_bytes(bad)
+    with pytest.raises(mcz.FormatError, match="damaged, so it was not protected; 1 fault: crc of"):
+        mcz.protect(path, anew=anew)
+    assert path.read_bytes() == bad
+
+
 def test_all_of_a_file_is_protected_anew(archive: bytes, tmp_path: Path) -> None:
     """A lost tail that takes all that was appended costs nothing then."""
     path = tmp_path / "a.mcz"

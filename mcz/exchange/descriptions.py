@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File
+from mcz.model.text_format import count_text
 from mcz.model.types import JsonObject
 
 MEDIA_TYPE = "application/vnd.mcz"
@@ -66,7 +67,7 @@ def datacite(file: File, clips: Sequence[Clip]) -> JsonObject:
             holder, lambda name: {"name": name, "contributorType": "RightsHolder"}
         ),
         "dates": _each(_range(days), lambda day: {"date": day, "dateType": "Collected"}),
-        "sizes": [f"{file.size} bytes", f"{len(clips)} clips"],
+        "sizes": [f"{file.size} bytes", count_text(len(clips), "clip")],
         "formats": [MEDIA_TYPE],
         "rightsList": [rights] if rights["rights"] else [],
         "descriptions": _each(

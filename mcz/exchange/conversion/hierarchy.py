@@ -34,10 +34,13 @@ STRETCHING = ("sx", "sy", "sz", "length")
 BVH_KINDS = {"", *POSITION_KINDS, *ROTATION_KINDS, "sx", "sy", "sz"}
 
 
-def to_bvh(motion: Motion) -> Motion:
-    """``motion`` on joints of BVH; unchanged if it has such joints."""
+def to_bvh(motion: Motion, target: str = "BVH") -> Motion:
+    """``motion`` on joints of BVH; unchanged if it has such joints.
+
+    ``target`` is the format that errors name.
+    """
     skeleton = motion.skeleton
-    _check(motion)
+    _check(motion, target)
     if is_bvh(skeleton):
         return _unmistakable(motion)
     Chain(skeleton)  # refuses a skeleton without kinematics
@@ -121,13 +124,13 @@ def is_bvh(skeleton: Skeleton) -> bool:
     )
 
 
-def _check(motion: Motion) -> None:
+def _check(motion: Motion, target: str) -> None:
     if point_set(motion.skeleton) == "markers":
-        raise MotionError("markers have no skeleton, and BVH needs one", clip=motion.name)
+        raise MotionError(f"markers have no skeleton, and {target} needs one", clip=motion.name)
     if not motion.signals[0].has_poses:
-        raise MotionError("BVH can hold only the channels of a skeleton", clip=motion.name)
+        raise MotionError(f"{target} can hold only the channels of a skeleton", clip=motion.name)
     if gap := first_gap(motion):
-        raise MotionError(f"BVH cannot omit values, but {gap}", clip=motion.name)
+        raise MotionError(f"{target} cannot omit values, but {gap}", clip=motion.name)
     if is_bvh(motion.skeleton):
         return
     for joint in motion.skeleton.joints:
@@ -216,7 +219,7 @@ def to_amc(motion: Motion) -> Motion:
     Quaternions and rotation vectors become angles, as in BVH.
     """
     if any(c.kind in (*QUATERNION_KINDS, *VECTOR_KINDS) for c in motion.skeleton.channels):
-        motion = to_bvh(motion)
+        motion = to_bvh(motion, "AMC")
     skeleton = motion.skeleton
     if not skeleton.intrinsic:
         return motion

@@ -42,10 +42,11 @@ from mcz.files.editing.appending import (
     redundancy_of,
 )
 from mcz.files.editing.rewriting import UNPROTECTED, disk_path, plan_whole, rewriting
-from mcz.files.reading.file import open_bytes
+from mcz.files.reading.faults import quick_check
+from mcz.files.reading.file import open, open_bytes
 from mcz.files.writing.atomic import replacing_file
 from mcz.model.checks import merged_ranges
-from mcz.model.text_format import fields_text
+from mcz.model.text_format import count_text, fields_text
 from mcz.model.types import Progress, Target
 
 MOST_SHIFTS = 16
@@ -374,14 +375,26 @@ def protect(
     wherever they lie: single bytes, a burst, the beginning, the end. If the file has recovery data
     already, only bytes appended since get new data; without such bytes nothing changes. ``anew``
     rewrites the file and computes recovery data for all of it. Returns all recovery data, in the
-    order of the file. Raises OptionError for a ``redundancy`` out of range, FormatError if
-    rewriting would lose a chunk of unknown type, AccessError if another process is appending,
-    and as ``mcz.append`` for a file cut short.
+    order of the file. Raises OptionError for a ``redundancy`` out of range, FormatError for a
+    damaged file, or if rewriting would lose a chunk of unknown type, AccessError if another process
+    is appending, and as ``mcz.append`` for a file cut short.
     """
     check_redundancy(redundancy)
+    _refuse_damage(target)
     if anew and (protection := _protect_again(target, redundancy, progress)) is not None:
         return [protection]
     return add_recovery(target, redundancy, progress)
+
+
+def _refuse_damage(target: Target) -> None:
+    """Raise FormatError for bad bytes, which recovery data would take for good ones."""
+    faults = quick_check(target)[1]
+    if not faults:
+        return
+    with open(target) as file:  # a file cut short has an error of its own
+        count = count_text(len(faults), "fault")
+        text = f"damaged, so it was not protected; {count}: {faults[0].message}"
+        raise FormatError(text, path=file.name)
 
 
 def _protect_again(target: Target, redundancy: float, progress: Step | None) -> Protection | None:

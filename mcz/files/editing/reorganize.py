@@ -73,7 +73,8 @@ def delete_clips(
         if where is not None:
             named += [(CLIP, clip.name) for clip in file.find(where)]
         if not named:
-            raise OptionError("nothing to delete; name clips or give where", path=file.name)
+            reason = "name clips or give where" if where is None else f"no clip matches {where!r}"
+            raise OptionError(f"nothing to delete; {reason}", path=file.name)
         gone = dict.fromkeys(named)
         others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in gone]
         missed = [alias for _, alias in others if (ALIAS, alias) not in gone]

@@ -32,6 +32,7 @@ from mcz.kinematics.points import point_names
 from mcz.model.motion import Skeleton
 from mcz.model.schema import parse
 from mcz.model.signal import Scaling
+from mcz.model.text_format import count_text
 
 if TYPE_CHECKING:
     from mcz.sources.c3d.recording import Recording
@@ -181,7 +182,8 @@ class StoredClip:
                 f"frames is {frames!r}; it must be two integers, first and end"
             ) from None
         if not 0 <= start <= stop <= self.n_frames:
-            raise OptionError(f"it has {self.n_frames} frames, not {start}:{stop}", clip=self.name)
+            count = count_text(self.n_frames, "frame")
+            raise OptionError(f"it has {count}, not {start}:{stop}", clip=self.name)
         return start, stop
 
     @property

@@ -243,7 +243,8 @@ def refuse_inputs(target: object, inputs: Iterable[object]) -> None:
         if _identity(source) == target_is:
             name = _name(target)
             other = f" ({_name(source)})" if _name(source) != name else ""
-            raise OptionError(f"{name}: the output is the input itself{other}; name another output")
+            text = f"the output is the input itself{other}; name another output"
+            raise OptionError(text, path=name)
 
 
 def _name(file: object) -> str:

@@ -186,6 +186,8 @@ def _equal_joints(a: Motion, b: Motion) -> list[str]:
     if any(not motion.signals[0].has_poses for motion in (a, b)):
         return []
     theirs = {name: joint for joint, name in enumerate(b.skeleton.addresses())}
+    rows = [motion.signals[0].masked().astype("<f8") for motion in (a, b)]
+    starts = [motion.skeleton.column_starts() for motion in (a, b)]
     equal = []
     for joint, name in enumerate(a.skeleton.addresses()):
         kinds = [channel.kind for channel in a.skeleton.joints[joint].channels]
@@ -194,10 +196,9 @@ def _equal_joints(a: Motion, b: Motion) -> list[str]:
             continue
         if kinds != [channel.kind for channel in b.skeleton.joints[other].channels]:
             continue
-        both = ((a, a.skeleton.columns(joint)), (b, b.skeleton.columns(other)))
         bits = [
-            motion.signals[0].masked()[:, list(columns)].astype("<f8").tobytes()
-            for motion, columns in both
+            values[:, first[index] : first[index + 1]].tobytes()
+            for values, first, index in zip(rows, starts, (joint, other), strict=True)
         ]
         equal += [name] if bits[0] == bits[1] else []
     return equal
