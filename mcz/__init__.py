@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from mcz.exchange.adapters.c3d import from_c3d, from_ezc3d, to_c3d, to_ezc3d
     from mcz.exchange.adapters.movement import from_movement, to_movement
     from mcz.exchange.adapters.pybvh import from_pybvh, to_pybvh
-    from mcz.exchange.conversion import Fit, convert, from_positions, left_out
+    from mcz.exchange.conversion import Fit, conversion_losses, convert, from_positions
     from mcz.exchange.conversion.scenes import SceneFile, to_glb, to_usda
     from mcz.exchange.datasets import (
         Dataset,
@@ -125,7 +125,7 @@ _HOMES = {
     "mcz.files.editing": ("Outcome", "Report"),
     "mcz.files.reading.clip": ("Clip",),
     "mcz.files.live.clip_state": ("LiveFrame", "StreamSummary"),
-    "mcz.exchange.conversion": ("Fit", "convert", "from_positions", "left_out"),
+    "mcz.exchange.conversion": ("Fit", "convert", "from_positions", "conversion_losses"),
     "mcz.exchange.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
     "mcz.files.editing.appending": ("Protection",),
     "mcz.files.editing.recovering": ("Recovery", "protect"),
@@ -263,6 +263,7 @@ __all__ = [
     "check_bag",
     "compare",
     "contacts",
+    "conversion_losses",
     "convert",
     "dataset",
     "delete_clips",
@@ -278,7 +279,6 @@ __all__ = [
     "humanml3d_positions",
     "in_positions",
     "joint_map",
-    "left_out",
     "live_frames",
     "merge",
     "mirror",

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz import Channel, Joint, Motion, Signal, Skeleton, left_out
+from mcz import Channel, Joint, Motion, Signal, Skeleton, conversion_losses
 from mcz.sources import FORMATS
 from mcz.sources.sample import bvh_walk
 from tests.clocked_files import motive, trc
@@ -70,7 +70,7 @@ def test_tables_have_the_times(source: str, to: str, tmp_path: Path) -> None:
     if motion.frame_rate is not None and source != "irregular":
         assert made.frame_rate is not None
         assert abs(made.frame_rate / motion.frame_rate - 1) < 1e-8  # TRC prints 6 decimals of it
-    assert not [text for text in left_out(motion, to) if "time" in text]
+    assert not [text for text in conversion_losses(motion, to) if "time" in text]
 
 
 @pytest.mark.parametrize("to", ["trc", "sto", "mot"])
@@ -112,7 +112,11 @@ C3D = {
 def test_a_c3d_has_the_time_of_its_first_frame(source: str, tmp_path: Path) -> None:
     motion = SOURCES[source]()
     made = again(motion, "c3d", tmp_path)
-    said = [text for text in left_out(motion, "c3d") if "time" in text and "numbers" not in text]
+    said = [
+        text
+        for text in conversion_losses(motion, "c3d")
+        if "time" in text and "numbers" not in text
+    ]
     assert said == C3D[source]
     if not any("first frame" in text for text in said):
         assert abs(made.times[0] - motion.times[0]) < 1e-9
@@ -122,7 +126,9 @@ def test_a_c3d_has_the_time_of_its_first_frame(source: str, tmp_path: Path) -> N
 
 def test_times_without_a_rate_are_lost_in_a_c3d() -> None:
     motion = replace(irregular(), frame_rate=None)
-    assert "left out: times, which C3D cannot state without a frame rate" in left_out(motion, "c3d")
+    assert "left out: times, which C3D cannot state without a frame rate" in conversion_losses(
+        motion, "c3d"
+    )
     assert mcz.convert(motion, "c3d").frame_rate is None
 
 
@@ -132,7 +138,9 @@ def test_numbers_that_count_from_0_begin_a_c3d_at_their_time(tmp_path: Path) -> 
     made = again(motion, "c3d", tmp_path)
     assert made.frame_numbers is not None
     assert (motion.times[0], made.times[0], made.frame_numbers[0]) == (1.0, 1.0, 101)
-    assert any("they begin with 101, as the times say" in text for text in left_out(motion, "c3d"))
+    assert any(
+        "they begin with 101, as the times say" in text for text in conversion_losses(motion, "c3d")
+    )
 
 
 @pytest.mark.parametrize(("to", "first"), [("bvh", "0"), ("amc", "0.01")])
@@ -140,19 +148,19 @@ def test_skeletons_say_what_they_lose(to: str, first: str) -> None:
     motion = bvh_walk().cut(0, 9)
     motion = replace(motion, source=None, frame_rate=Fraction(100), first_time=1.23)
     motion = replace(motion, frame_numbers=np.arange(2, 11))
-    said = [text for text in left_out(motion, to) if "first frame" in text]
+    said = [text for text in conversion_losses(motion, to) if "first frame" in text]
     assert said == [
         f"left out: the time of the first frame, 1.23 s: {to.upper()} begins at {first} s"
     ]
     gap = replace(motion, frame_numbers=GAP, first_time=None)
-    lost = [text for text in left_out(gap, to) if "gap" in text]
+    lost = [text for text in conversion_losses(gap, to) if "gap" in text]
     assert lost == (
         ["left out: a gap in time of 0.04 s: BVH has frame after frame"] if to == "bvh" else []
     )
     if to == "amc":
-        assert "left out: the frame rate, 100 a second" in left_out(gap, to)
+        assert "left out: the frame rate, 100 a second" in conversion_losses(gap, to)
     plain = replace(motion, frame_numbers=None, first_time=None)
-    assert not [text for text in left_out(plain, to) if " time" in text]
+    assert not [text for text in conversion_losses(plain, to) if " time" in text]
 
 
 @pytest.mark.parametrize("source", SOURCES)

@@ -278,7 +278,7 @@ def test_signals_without_a_place_are_left_out_and_named(to: str) -> None:
         plain, made = mcz.convert(motion, to), mcz.convert(more, to)
         assert [signal.name for signal in made.signals] == [s.name for s in plain.signals]
         assert made.values.tobytes() == plain.values.tobytes()
-        losses = set(mcz.left_out(more, to)) - set(mcz.left_out(motion, to))
+        losses = set(mcz.conversion_losses(more, to)) - set(mcz.conversion_losses(motion, to))
         assert losses == {"left out: signal dmpls"}
 
 

@@ -184,14 +184,14 @@ def test_names_mean_clips_as_elsewhere(archive_path: Path) -> None:
 
 def test_names_and_queries_together(archive: Path) -> None:
     with mcz.open(archive) as file:
-        assert [c.name for c in file.chosen()] == list(file.clips)
-        assert [c.name for c in file.chosen(["16_01", "05_01"])] == ["16_01", "05_01"]
+        assert [c.name for c in file.select_clips()] == list(file.clips)
+        assert [c.name for c in file.select_clips(["16_01", "05_01"])] == ["16_01", "05_01"]
         names = ["16_01", "05_01"]
-        assert [c.name for c in file.chosen(names, "subject == 5")] == ["05_01"]
+        assert [c.name for c in file.select_clips(names, "subject == 5")] == ["05_01"]
         with pytest.raises(OptionError, match="none of 1 clip matches 'subject == 5'"):
-            file.chosen(["16_01"], "subject == 5")
+            file.select_clips(["16_01"], "subject == 5")
         with pytest.raises(OptionError, match="none of 4 clips matches what is asked for"):
-            file.chosen(where=lambda clip: False)
+            file.select_clips(where=lambda clip: False)
 
 
 def test_twenty_thousand_clips(archive: Path) -> None:

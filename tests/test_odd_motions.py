@@ -191,7 +191,7 @@ def test_things_in_wrong_places(kind: type, name: str) -> None:
             continue
         except Exception as error:
             raise AssertionError(f"{kind.__name__}.{name} = {thing!r:.200}: {error!r}") from error
-        same(decoded, motion.counted_by_ones())
+        same(decoded, motion.with_consecutive_numbers())
 
 
 def same(found: mcz.Motion, motion: mcz.Motion) -> None:

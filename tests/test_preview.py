@@ -56,7 +56,7 @@ def test_the_coarsest_resolution_where_no_frame_is_exact() -> None:
             resolution = step.bit_length() - 1
             assert frames.tolist() == list(range(0, 301, step))
             assert np.array_equal(values, clip.read(resolution=resolution, decimate=True))
-            assert clip.previewed().is_regular
+            assert clip.read_preview().is_regular
 
 
 def test_one_resolution_has_no_preview() -> None:
@@ -113,7 +113,7 @@ def test_as_a_motion_at_a_lower_rate() -> None:
     with mcz.open(write_bytes(smooth(190), "qbc", delta=40)) as file:
         found = preview_motion(file.only_clip())  # the last frame is nearer: it does not fit a rate
         assert found.frame_numbers.tolist() == [1, 41, 81, 121, 161]
-        assert not file.only_clip().previewed().is_regular
+        assert not file.only_clip().read_preview().is_regular
     with mcz.open(write_bytes(smooth(0), "qbc")) as file:
         assert preview_motion(file.only_clip()).n_frames == 0
 

@@ -165,7 +165,7 @@ def test_blender_puts_the_joints_of_a_bvh_there(samples: Path, tmp_path: Path, n
 
 
 def losses_text(motion: Motion, to: str) -> str:
-    return "; ".join(mcz.left_out(motion, to))
+    return "; ".join(mcz.conversion_losses(motion, to))
 
 
 def test_other_signals_are_named(samples: Path) -> None:

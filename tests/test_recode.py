@@ -92,7 +92,7 @@ def test_a_joint_is_replaced(codec: str) -> None:
     off = np.abs(after.values[:] - wanted)
     others = np.delete(off, own, axis=1)
     assert (found.max_error, found.others_error) == (off[:, own].max(), others.max())
-    assert found.anew and off.max() < 1.0
+    assert found.is_recoded and off.max() < 1.0
     record = after.quality
     assert record["edit-joints"] == "knee" and record["edit-recoded"] == "yes"
     assert record["unedited_mse"] == before.quality["mse"]
@@ -120,7 +120,7 @@ def test_a_lossless_clip_is_coded_anew_without_an_error() -> None:
     assert clip(part.getvalue()).values[:].tobytes() == values[2:20][:, own].tobytes()
     knee = columns(clip(data), "knee")
     done = mcz.replace(data, None, "knee", values[:, knee] + 0.5, edited, recode=True)
-    assert done.anew and (done.max_error, done.others_error) == (0, 0)
+    assert done.is_recoded and (done.max_error, done.others_error) == (0, 0)
     values[:, knee] += 0.5
     after = clip(edited.getvalue())
     assert after.codec == "best" and after.values[:].tobytes() == values.tobytes()

@@ -276,7 +276,7 @@ def test_what_protected_files_are_merged_to_is_protected(archive: bytes, tmp_pat
     a, b, bare = (tmp_path / f"{name}.mcz" for name in ("a", "b", "bare"))
     a.write_bytes(archive)
     b.write_bytes(archive)
-    mcz.protect(b, 0.2, anew=True)
+    mcz.protect(b, 0.2, rebuild=True)
     mcz.extract(a, bare, frames=(0, 9), copies=False)
     report = mcz.merge([a, b], tmp_path / "c.mcz", rename=True)
     assert report.left_out == []
@@ -322,7 +322,7 @@ def test_all_of_a_file_is_protected_anew(archive: bytes, tmp_path: Path) -> None
     path = tmp_path / "a.mcz"
     path.write_bytes(archive)
     mcz.set_metadata(path, {"walk": {"subject": "05"}})
-    (protection,) = mcz.protect(path, 0.1, anew=True)
+    (protection,) = mcz.protect(path, 0.1, rebuild=True)
     whole = path.read_bytes()
     assert (protection.start, protection.stop) == (0, len(whole))
     report, found = restore_file(whole[: -protection.burst], tmp_path)
@@ -345,7 +345,7 @@ def test_a_full_disk_costs_no_recovery_data(
     path.write_bytes(archive)
     monkeypatch.setattr("mcz.files.editing.appending.write_recovery", full)
     for rewrite in (
-        lambda: mcz.protect(path, 0.1, anew=True),
+        lambda: mcz.protect(path, 0.1, rebuild=True),
         lambda: mcz.delete_clips(path, "more"),
     ):
         with pytest.raises(mcz.AccessError, match="No space"):

@@ -328,7 +328,7 @@ def test_a_restored_file_keeps_the_bound(processor: int, size: int, tmp_path: Pa
     assert mcz.verify(path) == []
     with mcz.open(path) as file:
         clip = file.only_clip()
-        assert not clip.gives_file()
+        assert not clip.can_restore()
         decoded, restored = clip.motion(), c3d.read(clip.source_bytes(), "clip")
     for found in (decoded, restored):
         signals = {signal.role: signal for signal in (*motion.signals, *found.signals)}

@@ -49,7 +49,7 @@ def clip_outputs(
         outputs = [_source_output(clip, part)]
         summary.notes = _rate_notes(clip, part, options)
     elif options.is_converted:
-        from mcz.exchange.conversion import left_out
+        from mcz.exchange.conversion import conversion_losses
         from mcz.exchange.conversion.scenes import to_scene
         from mcz.files.reading.source_files import SourceOptions
 
@@ -69,7 +69,7 @@ def clip_outputs(
             outputs = [_converted_output(motion, target, summary.scene.data)]
         else:
             outputs = _convert(motion, target, rate, options.with_skeleton)
-        summary.left_out = left_out(motion, target)
+        summary.left_out = conversion_losses(motion, target)
     else:
         outputs = [_export(clip, target, part, options)]
         summary.left_out = _signals_left_out(clip, options)
@@ -287,7 +287,7 @@ def _rate_notes(clip: Clip, part: ClipSelection, options: DecodeOptions) -> tupl
 
     if options.decimate:
         return ()
-    is_file = not options.filtered and clip.gives_file(part.frames, options.resolution)
+    is_file = not options.filtered and clip.can_restore(part.frames, options.resolution)
     start = part.frames[0] if part.frames else 0
     notes = text_notes(clip, start, is_file=is_file)
     return tuple(f"clip {clip.name}: {note}" for note in notes)

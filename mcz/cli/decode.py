@@ -196,7 +196,7 @@ def _select_clips(
     file: File, output: str | None, names: tuple[str, ...], where: str | None
 ) -> list[Clip]:
     if where is not None:
-        clips = file.chosen(names or None, where)
+        clips = file.select_clips(names or None, where)
     elif not file.clips:
         return []
     else:

@@ -268,7 +268,7 @@ class PreviewSelection(ClipSelection):
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
         from mcz.files.tables import Table
 
-        preview = self.clip.previewed(joints)
+        preview = self.clip.read_preview(joints)
         numbers, rate = self.clip.frame_numbers[preview.frames], self.clip.frame_rate
         timeline = self._timeline()
         return Table(
@@ -289,7 +289,7 @@ def preview_motion(clip: Clip) -> Motion:
     from mcz.model.clock import Timeline
     from mcz.model.motion import Motion, Signal
 
-    preview = clip.previewed()
+    preview = clip.read_preview()
     gaps = np.diff(preview.frames)
     n_frames = len(preview.frames) - int(len(gaps) > 0 and gaps[-1] != preview.step)
     info, rate = clip.signals[0], clip.frame_rate

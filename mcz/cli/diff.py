@@ -208,7 +208,7 @@ def _filter_names(left: _Side, right: _Side, names: tuple[str, ...], where: str)
     side = left if left.file is not None else right
     if side.file is None:
         raise Failure("--where selects clips of an .mcz, and neither file is one", Exit.USAGE)
-    clips = side.file.chosen(names or None, where)
+    clips = side.file.select_clips(names or None, where)
     if names:
         return tuple(name for name in names if side.file[name] in clips)
     names = tuple(clip.name for clip in clips)

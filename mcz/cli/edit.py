@@ -213,10 +213,10 @@ def replace_command(
     if as_json:
         print_json({"output": shown, **asdict(result)})
         return Exit.FINE
-    coded = f"{result.joint} of {result.clip}" + (", re-encoded" if result.anew else "")
+    coded = f"{result.joint} of {result.clip}" + (", re-encoded" if result.is_recoded else "")
     line = f"{shown}: {result.size:,} bytes; {coded}: {result.joint_bytes:,}"
     echo(f"{line} of {result.joint_bytes_before:,} bytes, {result.codec}")
-    if result.anew:
+    if result.is_recoded:
         off = f"{result.max_error:.3g}, others {result.others_error:.3g}"
         echo(f"  greatest error, in units of the source: {result.joint} {off}")
     if result.n_exceptions or result.n_exceptions_before:

@@ -69,7 +69,7 @@ def list_command(
         raise JsonRefused("--csv and --json exclude each other", Exit.USAGE)
     names = None if columns is None else [name.strip() for name in columns.split(",")]
     with open_input(file, salvage=salvage) as opened_file, errors_about(file):
-        clips = opened_file.chosen(where=where)
+        clips = opened_file.select_clips(where=where)
         if sort is not None:
             from mcz.files.editing.reorganize import in_order
 
@@ -269,7 +269,7 @@ def meta_command(
         raise Failure("--to prints a record, so it excludes changes", Exit.USAGE)
     if form:
         with open_input(file) as opened_file, errors_about(file):
-            return _describe(opened_file, opened_file.chosen(clips or None, where), form)
+            return _describe(opened_file, opened_file.select_clips(clips or None, where), form)
     if not (pairs or removed or table or rate or purge):
         with open_input(file) as opened_file:
             return _show(opened_file, _select_clips(opened_file, clips, where, of_file), as_json)
@@ -293,7 +293,7 @@ def _select_clips(
 ) -> Mapping[str, Clip | None]:
     if of_file:
         return {"": None}
-    chosen = file.chosen(clips or None, where)
+    chosen = file.select_clips(clips or None, where)
     every: dict[str, Clip | None] = {} if clips or where else {"": None}
     return every | {clip.name: clip for clip in chosen}
 
@@ -339,7 +339,7 @@ def _changes(
     with open_input(file) as opened_file, errors_about(file):
         if rows is not None:
             table_rows, unknown = rows(opened_file)
-            clip_names = {clip.name for clip in opened_file.chosen(clips or None, where)}
+            clip_names = {clip.name for clip in opened_file.select_clips(clips or None, where)}
             changes = {name: dict(row) for name, row in table_rows.items() if name in clip_names}
         if edits:
             names: Iterable[str] = (

@@ -40,7 +40,7 @@ def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
     help="Set the share of bytes to add; a small file gets more, so that it survives some damage.",
 )
 @click.option(
-    "--anew", is_flag=True, help="Rewrite the file, with one set of recovery data for all of it."
+    "--rebuild", is_flag=True, help="Rewrite the file, with one set of recovery data for all of it."
 )
 @click.option(
     "--check",
@@ -48,17 +48,21 @@ def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
     help="Report whether the file is intact or can be repaired; change nothing.",
 )
 @shared_options.json
-def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool) -> Exit:
+def protect_command(
+    file: str, redundancy: float, rebuild: bool, check: bool, as_json: bool
+) -> Exit:
     """Append recovery data to FILE.mcz, with which mcz repair can restore every byte.
 
     Repair succeeds if there are at least as many recovery blocks as bad blocks, anywhere: single
     bytes, a burst, the beginning or the end of the file. The file stays readable at every moment.
-    Parts appended later have their own recovery data, which may be lost with the tail; --anew makes
-    one set for the whole file.
+    Parts appended later have their own recovery data, which may be lost with the tail; --rebuild
+    makes one set for the whole file.
     """
     require_file(file)
-    if anew and check:
-        raise Failure("--check and --anew exclude each other: --check changes nothing", Exit.USAGE)
+    if rebuild and check:
+        raise Failure(
+            "--check and --rebuild exclude each other: --check changes nothing", Exit.USAGE
+        )
     if check:
         return _check_protection(file, as_json)
     import mcz
@@ -67,7 +71,7 @@ def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_js
         protections = mcz.protect(
             file,
             redundancy,
-            anew=anew,
+            rebuild=rebuild,
             progress=lambda done, total: progress(done + 1, total, "recovery data"),
         )
     if as_json:
@@ -81,7 +85,7 @@ def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_js
         )
     if len(protections) > 1:
         parts = f"these {len(protections)} parts are protected separately"
-        echo(f"{file}: {parts}; --anew protects them together")
+        echo(f"{file}: {parts}; --rebuild protects them together")
     return Exit.FINE
 
 

@@ -208,7 +208,7 @@ def is_malformed(error: MczError) -> bool:
 def _check_parts(file: File, where: str | None, progress: Progress) -> Iterator[JsonObject]:
     from mcz.files.reading.faults import part_problems, structure_problems
 
-    clips = None if where is None else file.chosen(where=where)
+    clips = None if where is None else file.select_clips(where=where)
     total = 1 + len(file.clips if clips is None else clips) + len(file.attachments)
     problems = structure_problems(file)
     yield _row("structure", "", [in_options(problem.message) for problem in problems])

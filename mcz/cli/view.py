@@ -324,7 +324,7 @@ def _clips(registry: FileRegistry, options: Settings) -> Iterator[tuple[str, Cli
                 given.target(), salvage=options["salvage"], max_decoded=options["max_decoded"]
             ) as file,
         ):
-            for clip in file.chosen(options["clips"] or None, options["where"]):
+            for clip in file.select_clips(options["clips"] or None, options["where"]):
                 yield given.name, clip
 
 

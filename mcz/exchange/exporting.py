@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.errors import FormatError, MczError, MotionError, OptionError
-from mcz.exchange.conversion import TARGETS, converted_files, left_out
+from mcz.exchange.conversion import TARGETS, conversion_losses, converted_files
 from mcz.exchange.conversion.scenes import WRITERS, to_scene
 from mcz.files.editing import Outcome, Report, failure_outcome
 from mcz.files.editing.folders import Folder, PortableNames
@@ -248,7 +248,7 @@ def export(
 
     options: JsonObject = {"max_decoded": max_decoded, "threads": threads, "verify": True}
     with limit_jobs(jobs), open(target, **options) as file:
-        chosen = file.chosen(clips, where)
+        chosen = file.select_clips(clips, where)
         called = [clip.name for clip in chosen]
         with share_clips(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
             for done, (name, converted) in enumerate(zip(called, converting, strict=True)):
@@ -277,7 +277,7 @@ def _converted(
 def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Exported]:
     """The files that a clip becomes: an ASF before the AMC that needs it."""
     if to in EXPORTS:
-        yield _named(clip, to), EXPORTS[to](table_of(motion)), left_out(motion, to)
+        yield _named(clip, to), EXPORTS[to](table_of(motion)), conversion_losses(motion, to)
         return
     if to in WRITERS:
         scene = to_scene(motion, to, key_error_mm=key_error)
@@ -285,11 +285,11 @@ def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iter
         return
     if to == BIDS:
         for path, data in clip_files(motion).items():
-            yield path, data, left_out(motion, to) if path.endswith(MOTION_SUFFIX) else ()
+            yield path, data, conversion_losses(motion, to) if path.endswith(MOTION_SUFFIX) else ()
         return
     files = converted_files(motion, to, None, True)
     for suffix in sorted(files, reverse=True):
-        notes = left_out(motion, to) if suffix == to else ()
+        notes = conversion_losses(motion, to) if suffix == to else ()
         yield _named(clip, suffix), files[suffix], notes
 
 

@@ -82,7 +82,7 @@ def map_clips(
             raise OptionError(
                 "the machines of a cluster can open none of these files", path=file.name
             )
-        names = [clip.name for clip in file.chosen(where=where)]
+        names = [clip.name for clip in file.select_clips(where=where)]
         with use_engine(Cluster(used)), share_clips(_mapped, file, names, function) as answers:
             return [answer() for answer in answers]
 

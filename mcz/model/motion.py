@@ -243,7 +243,7 @@ class Motion:
     def with_values(self, values: Floats) -> Motion:
         """The same motion with other values of its motion signal, same shape."""
         signal = replace(self.signals[0], values=np.asarray(values, dtype=np.float64))
-        source = self.source and self.source.of_no_file()
+        source = self.source and self.source.without_file()
         return replace(self, signals=(signal, *self.signals[1:]), source=source)
 
     @property
@@ -272,7 +272,7 @@ class Motion:
         """The same motion without its source, at the same times."""
         return replace(self, source=None).at_times(self.timeline)
 
-    def counted_by_ones(self) -> Motion:
+    def with_consecutive_numbers(self) -> Motion:
         """The same motion at the same times with a ``number_step`` of 1, as files store it.
 
         Frame numbers are kept if there is a source, which may print them.

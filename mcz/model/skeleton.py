@@ -76,14 +76,14 @@ class Source:
         if self.size < 0:
             raise MotionError(f"source: size is {self.size}")
 
-    def of_no_file(self) -> Source:
+    def without_file(self) -> Source:
         """The same for changed values or frames: without size and hash."""
         return replace(self, size=0, sha256=b"")
 
     def cut(self, start: int, stop: int) -> Source:
         """The source of frames start <= f < stop."""
         notes = self.notes and self.notes.part(start, stop)
-        return replace(self, notes=notes).of_no_file()
+        return replace(self, notes=notes).without_file()
 
 
 Vector = tuple[float, float, float]

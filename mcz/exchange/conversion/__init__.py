@@ -11,9 +11,9 @@ from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion.hierarchy import to_amc, to_bvh
 from mcz.exchange.conversion.losses import (
     COUNTING,
+    conversion_losses,
     drop_time_signal,
     keep_supported_signals,
-    left_out,
 )
 from mcz.exchange.conversion.marker_fit import Fit, from_positions
 from mcz.files.reading.source_files import SourceOptions
@@ -79,10 +79,10 @@ def to_c3d(motion: Motion) -> Motion:
 __all__ = [
     "TARGETS",
     "Fit",
+    "conversion_losses",
     "convert",
     "converted_files",
     "from_positions",
-    "left_out",
 ]
 
 TARGETS = {

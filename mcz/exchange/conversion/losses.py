@@ -34,16 +34,16 @@ def keep_supported_signals(motion: Motion, to: str) -> Motion:
     )
 
 
-def left_out(motion: Motion, to: str) -> tuple[str, ...]:
+def conversion_losses(motion: Motion, to: str) -> tuple[str, ...]:
     """List the facts of ``motion`` that a file of the format ``to`` cannot hold, a text each.
 
     ``to`` is "csv", "npz", "glb", "usda" or a format of ``mcz.convert``. Metadata are left out of
     every format, and are not listed. An impossible conversion raises its own error.
     """
-    return tuple(_left_out(motion, to))
+    return tuple(_conversion_losses(motion, to))
 
 
-def _left_out(motion: Motion, to: str) -> Iterator[str]:
+def _conversion_losses(motion: Motion, to: str) -> Iterator[str]:
     if to in SHAPED and has_no_lengths(motion.skeleton):
         yield f"{NO_LENGTHS}: all joints lie at the root until rest offsets are set"
     known = HELD_ROLES.get(to, ())

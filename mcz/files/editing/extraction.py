@@ -132,7 +132,7 @@ def extract(
     with open(source, salvage=salvage, max_decoded=max_decoded) as opened:
         file = File(opened.container.strictly())
         names = [clip] if isinstance(clip, str) else clip
-        clips = file.chosen(names, where)
+        clips = file.select_clips(names, where)
         if not clips:
             raise OptionError("the file has no clip", path=file.name)
         cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]

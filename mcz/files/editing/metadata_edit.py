@@ -139,7 +139,9 @@ def set_rate(
     with rewriting(target, output, force=force, progress=progress) as job:
         file = job.file
         named = names is not None or where is not None
-        clips = file.chosen(names, where) if named else [c for c in file if c.frame_rate is None]
+        clips = (
+            file.select_clips(names, where) if named else [c for c in file if c.frame_rate is None]
+        )
         report, plan = Report(), plan_whole(file)
         for clip in clips:
             _check_rate(clip, exact, force)

@@ -358,7 +358,7 @@ def with_own_source(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
     motion = stating_rate(motion, clip.frame_numbers)
     if motion.source is None:
         return motion, None
-    source = motion.source.of_no_file()
+    source = motion.source.without_file()
     try:
         FORMATS[source.format].write(replace(motion, source=source))
     except MotionError as error:

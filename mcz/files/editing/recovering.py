@@ -366,14 +366,14 @@ def protect(
     target: str | os.PathLike[str],
     redundancy: float = DEFAULT,
     *,
-    anew: bool = False,
+    rebuild: bool = False,
     progress: Step | None = None,
 ) -> list[Protection]:
     """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
 
     ``mcz.repair`` restores every byte as long as there are no more bad blocks than recovery blocks,
     wherever they lie: single bytes, a burst, the beginning, the end. If the file has recovery data
-    already, only bytes appended since get new data; without such bytes nothing changes. ``anew``
+    already, only bytes appended since get new data; without such bytes nothing changes. ``rebuild``
     rewrites the file and computes recovery data for all of it. Returns all recovery data, in the
     order of the file. Raises OptionError for a ``redundancy`` out of range, FormatError for a
     damaged file, or if rewriting would lose a chunk of unknown type, AccessError if another process
@@ -381,7 +381,7 @@ def protect(
     """
     check_redundancy(redundancy)
     _refuse_damage(target)
-    if anew and (protection := _protect_again(target, redundancy, progress)) is not None:
+    if rebuild and (protection := _protect_again(target, redundancy, progress)) is not None:
         return [protection]
     return add_recovery(target, redundancy, progress)
 

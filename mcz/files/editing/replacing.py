@@ -52,7 +52,7 @@ class Replacement:
     off the grid, which are counted too. ``max_error``: greatest difference of a decoded value from
     the given one, in source units.
 
-    ``anew``: the whole clip was encoded again, and other joints are off by at most
+    ``is_recoded``: the whole clip was encoded again, and other joints are off by at most
     ``others_error``; the numbers of bytes are those of the clip then.
     """
 
@@ -66,7 +66,7 @@ class Replacement:
     max_error: float
     left_out: tuple[str, ...]
     size: int
-    anew: bool = False
+    is_recoded: bool = False
     others_error: float = 0.0
 
     __repr__ = fields_text
@@ -140,7 +140,7 @@ class _Sizes:
 
 class _Editor(Copier):
     joint: int
-    anew = False
+    is_recoded = False
 
     def __init__(self, copying: Copying, clip: Clip) -> None:
         super().__init__(copying)
@@ -164,7 +164,7 @@ class _Editor(Copier):
             max_error=self.max_error,
             left_out=tuple(self.left_out),
             size=self.writer.offset,
-            anew=self.anew,
+            is_recoded=self.is_recoded,
             others_error=self.others_error,
         )
 
@@ -182,7 +182,7 @@ class _StreamEditor(_Editor):
             return super().finish_record(cut, new)
         source, motion = b"", self.recoded.decoded
         if new.source is not None and motion.source is not None:
-            motion = dataclasses.replace(motion, source=motion.source.of_no_file())
+            motion = dataclasses.replace(motion, source=motion.source.without_file())
             source = self.put_source(cut, new, motion)
         _, hashes = super().finish_record(cut, new)
         signal = motion.signals[0]
@@ -228,7 +228,7 @@ class _SegmentEdit(Unchanged):
 class _RecodingEditor(_Editor):
     """Decodes the clip and encodes it again after its edit."""
 
-    anew = True
+    is_recoded = True
 
     def __init__(self, copying: Copying, clip: Clip, edit: Edited) -> None:
         super().__init__(copying, clip)

@@ -151,7 +151,7 @@ def unpack(
         file = File(opened.container.strictly())
         report.damage += opened.damage
         timeless: list[str] = []  # files whose times are not in the archive
-        chosen_clips, whole = file.chosen(clips, where), clips is None and where is None
+        chosen_clips, whole = file.select_clips(clips, where), clips is None and where is None
         stored = list(files_of(file, None if whole else chosen_clips))
         writing = _Writing(target, folder, force, names, [one.path for one in stored])
         with share_clips(_restore, file, stored) as restoring:

@@ -270,7 +270,7 @@ class Clip(StoredClip):
             self._complain(f"its source file is lost: {error}", error)
             return None
         whole = (start, stop, resolution) == (0, self.n_frames, 0)
-        return source if whole else source.of_no_file()
+        return source if whole else source.without_file()
 
     @cached_property
     def timeline(self) -> Timeline | None:
@@ -307,10 +307,10 @@ class Clip(StoredClip):
         frames if the codec stores some apart (qbc: its marks); otherwise they are its coarsest
         resolution. Raises OptionError for a codec without either.
         """
-        shown = self.previewed(joints)
+        shown = self.read_preview(joints)
         return FrameValues(shown.frames, shown.masked())
 
-    def previewed(self, joints: Joints = None) -> Preview:
+    def read_preview(self, joints: Joints = None) -> Preview:
         """``preview`` with a separate mask, and the distance of its frames."""
         info = self.signals[0]
         groups, columns = self.groups_of(info, joints)
@@ -368,7 +368,7 @@ class Clip(StoredClip):
         if (info := self.source) is None:
             raise OptionError("the clip has no source file", clip=self.name, hint=Hint.CONVERT)
         check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
-        is_file = self.gives_file(frames, resolution)
+        is_file = self.can_restore(frames, resolution)
         motion = self._motion(frames, resolution, decimate)
         if motion.source is None and self.container.salvage:
             raise FormatError(
@@ -381,7 +381,7 @@ class Clip(StoredClip):
             self._check_source(data, info)
         return data
 
-    def gives_file(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
+    def can_restore(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
         """Return whether ``source_bytes`` returns the original file of the clip."""
         whole = self.checked_range(frames) == (0, self.n_frames) and not resolution
         return whole and all(signal.codec.lossless for signal in self.signals)

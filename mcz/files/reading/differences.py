@@ -83,7 +83,7 @@ def _start_note(clip: Clip, start: int, is_file: bool) -> str | None:
 
 def text_notes(clip: Clip, start: int = 0, *, is_file: bool | None = None) -> tuple[str, ...]:
     """All notes of the text of ``clip`` from frame ``start`` on; ``is_file``: None: of all."""
-    is_file = clip.gives_file() if is_file is None else is_file
+    is_file = clip.can_restore() if is_file is None else is_file
     notes = _rate_note(clip, is_file), _start_note(clip, start, is_file)
     return tuple(note for note in notes if note)
 

@@ -317,7 +317,7 @@ def verify(
             raise OptionError("a quick check covers the whole file, so where is not allowed")
         return quick_check(target)[1]
     with limit_jobs(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
-        return validate(file, None if where is None else file.chosen(where=where))
+        return validate(file, None if where is None else file.select_clips(where=where))
 
 
 def part_problems(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Row]:

@@ -252,7 +252,9 @@ class File:
         """
         return list(filter_clips(self, where, self.clips.values()))
 
-    def chosen(self, names: Iterable[str] | None = None, where: Where | None = None) -> list[Clip]:
+    def select_clips(
+        self, names: Iterable[str] | None = None, where: Where | None = None
+    ) -> list[Clip]:
         """The clips of these names that match ``where``; None: all.
 
         Raises OptionError as ``only_clip`` and ``find``, and if no clip matches.

@@ -131,7 +131,7 @@ class FilteredClip(Clip):
         motion = super().motion(frames, resolution, decimate=decimate)
         return _with_positions(motion, motion.signals[0].values)
 
-    def gives_file(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
+    def can_restore(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
         return False
 
 

@@ -48,7 +48,7 @@ def info(file: File, names: Sequence[str] | None = None, where: Where | None = N
     ``names``, ``where``: only of these clips, and of their skeletons, see ``File.chosen``.
     """
     container, whole = file.container, names is None and where is None
-    chosen = file.chosen(names, where)
+    chosen = file.select_clips(names, where)
     sizes = [clip_sizes(container, clip) for clip in chosen]
     clips = [_clip_info(file, clip, own) for clip, own in zip(chosen, sizes, strict=True)]
     shared = container.directory.shared

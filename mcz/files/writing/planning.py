@@ -122,7 +122,7 @@ def with_true_sources(motion: Motion, *, lossless: bool) -> Motion:
     skeleton that differs from its own file has none. Raises MotionError or FormatError if the
     source cannot hold the values.
     """
-    motion = replace(motion, skeleton=_with_true_source(motion.skeleton)).counted_by_ones()
+    motion = replace(motion, skeleton=_with_true_source(motion.skeleton)).with_consecutive_numbers()
     source = motion.source
     if source is None:
         return motion
@@ -130,7 +130,7 @@ def with_true_sources(motion: Motion, *, lossless: bool) -> Motion:
         raise MotionError(f"source format {source.format!r} is not one of {', '.join(FORMATS)}")
     if source.sha256 and _facts(_restore_source(motion, lossless)) == (source.size, source.sha256):
         return motion
-    return with_source_hash(replace(motion, source=source.of_no_file()), lossless=lossless)
+    return with_source_hash(replace(motion, source=source.without_file()), lossless=lossless)
 
 
 def _with_true_source(skeleton: Skeleton) -> Skeleton:
@@ -232,7 +232,7 @@ def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile
             f"{', '.join(find_targets(options))}: a value of {codec.dial.parameter} must be "
             "found first"
         )
-    counted = prepared.motion.counted_by_ones()
+    counted = prepared.motion.with_consecutive_numbers()
     motion = as_stored(with_source_hash(counted, lossless=codec.lossless))
     for signal in motion.signals:
         check(f"signal {signal.name!r}: channels", signal.n_channels, profile.channels)

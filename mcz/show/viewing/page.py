@@ -308,7 +308,7 @@ def _coded(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
     out = io.BytesIO()
     with mcz_open(target, salvage=registry.salvage, max_decoded=options.max_decoded) as file:
         writer = Writer(out, profile=file.container.profile)
-        for clip in file.chosen(options.clips or None, options.where):
+        for clip in file.select_clips(options.clips or None, options.where):
             motion = registry.with_facts(clip.motion())
             prepared = prepare(motion, codec, params, (under_its_path(motion.skeleton),))
             write_plan(writer, tuned_plan(prepared, codec, params, writer.profile))

@@ -66,7 +66,7 @@ def _chosen(file: mcz.File, wanted: Wanted) -> list[mcz.Clip]:
     if wanted.clip:
         return [file.only_clip(wanted.clip)]
     if wanted.where:
-        return file.chosen(None, wanted.where)
+        return file.select_clips(None, wanted.where)
     return list(file) if wanted.every and len(file) else [file.only_clip()]
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.exchange.conversion.hierarchy import is_moving, is_stretching, loose_tails
-from mcz.exchange.conversion.losses import first_gap, left_out
+from mcz.exchange.conversion.losses import conversion_losses, first_gap
 from mcz.hints import Hint
 from mcz.kinematics.chain import Chain, Floats, multiply_matrices
 from mcz.kinematics.frames import frame_poses_of
@@ -163,7 +163,7 @@ def _notes(motion: Motion) -> Iterator[str]:
         yield "its length unit is unknown; one unit becomes a meter"
     if not skeleton.up_axis:
         yield "the axis that points up is unknown: taken for y"
-    yield from left_out(motion, "glb")
+    yield from conversion_losses(motion, "glb")
 
 
 def _markers(motion: Motion, scale: float) -> Iterator[Node]:
