@@ -79,9 +79,13 @@ def build(
     arguments = [*command, *_flags(mode)]
     version = _run([*command, "--version"], ROOT).partition("\n")[0]
     folder.mkdir(parents=True, exist_ok=True)
+    # One after the other: a module that another thread is importing is not yet whole.
+    texts = {
+        name: Unit(modules, checked=mode == "checked").text() for name, modules in units.items()
+    }
 
     def build_unit(name: str) -> Path:
-        text = Unit(units[name], checked=mode == "checked").text()
+        text = texts[name]
         full = f"mcz.kernels.{mode}.{name}"  # other packages have a "numbers"
         made = kept / _key(full, text, version) / (name + SUFFIX)
         if not made.is_file():
