@@ -304,16 +304,16 @@ def test_protecting_twice_does_nothing(archive: bytes, tmp_path: Path) -> None:
             mcz.protect(path, wrong)
 
 
-@pytest.mark.parametrize("anew", [False, True])
+@pytest.mark.parametrize("rebuild", [False, True])
 def test_bad_bytes_are_not_protected_as_good_ones(
-    archive: bytes, tmp_path: Path, anew: bool
+    archive: bytes, tmp_path: Path, rebuild: bool
 ) -> None:
     bad = bytearray(archive)
     bad[archive.index(b"DATA") + 40] ^= 1
     path = tmp_path / "a.mcz"
     path.write_bytes(bad)
     with pytest.raises(mcz.FormatError, match="damaged, so it was not protected; 1 fault: crc of"):
-        mcz.protect(path, anew=anew)
+        mcz.protect(path, rebuild=rebuild)
     assert path.read_bytes() == bad
 
 
