@@ -338,3 +338,24 @@ def test_replace_counts_exceptions(folder: Path, call: Call) -> None:
     info = json.loads(call("info", folder / "x.mcz", "--json")[1])
     assert info["clips"][0]["n_exceptions"] == 720
     assert json.loads(call(*words, "--on-grid", "--json")[1])["n_exceptions"] == 0
+
+
+@pytest.mark.parametrize("name", ["new.bvh", "new.C3D", "new.csv", "new.npz"])
+def test_no_mcz_has_the_suffix_of_another_format(folder: Path, call: Call, name: str) -> None:
+    suffix = Path(name).suffix.lower()
+    message = f"{name}: an MCZ file must not have the suffix {suffix}; convert writes that format"
+    code, out, errors = call("encode", folder / "walk.bvh", "-o", folder / name)
+    assert (code, out) == (2, "")
+    assert errors.endswith(f"{message}\n")
+    with pytest.raises(OptionError, match=message):
+        mcz.write(mcz.read(folder / "walk.bvh"), folder / name)
+    assert not (folder / name).exists()
+
+
+def test_a_file_over_the_limits_is_refused_with_the_way_out(folder: Path, call: Call) -> None:
+    names = ",".join(f"c{n}" for n in range(20_000))
+    (folder / "wide.csv").write_text(f"{names}\n{'1,' * 19_999}1\n")
+    code, _, errors = call("encode", folder / "wide.csv")
+    assert code == 1
+    assert "channels: 20000 is over the limit of 16384; --profile large allows more" in errors
+    assert call("encode", folder / "wide.csv", "--profile", "large").code == 0

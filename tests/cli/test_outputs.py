@@ -39,7 +39,7 @@ WRITERS = {
 # These write folders, standard output or their own file.
 OTHERS = "append bag bench codecs completion diff export info list meta protect sample selftest"
 OTHERS += " split stream unpack verify"
-SUFFIXES = {"view": ".html", "render": ".png", "plot": ".svg"}  # all that they take
+SUFFIXES = {"encode": ".mcz", "view": ".html", "render": ".png", "plot": ".svg"}  # that they take
 every_writer = pytest.mark.parametrize("words", WRITERS)
 
 

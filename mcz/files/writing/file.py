@@ -58,7 +58,7 @@ from mcz.model.text_format import fields_text
 from mcz.model.threads import limit_threads
 from mcz.model.types import Params, Progress, Target
 from mcz.model.units import in_unit
-from mcz.sources import Format, format_of, is_table, wants_skeleton
+from mcz.sources import FORMATS, Format, format_of, is_table, wants_skeleton
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +123,8 @@ class SourceEncoder:
             if not self.options.verbatim:
                 if isinstance(error, SourceError):
                     error.add(hint=Hint.VERBATIM)
+                elif isinstance(error, LimitError) and transaction.writer.profile is not LARGE:
+                    error.add(hint=Hint.LARGE)
                 raise
             self.reason, self.remark, self.notes = remark_of(error), "", ()
             with transaction.step():
@@ -300,11 +302,22 @@ def write(
     motion = with_true_sources(motion, lossless=chosen.lossless)
     prepared = prepare(motion, chosen, params, (under_its_path(motion.skeleton),))
     with limit_threads(threads), replacing(target, force=force, inputs=params.values()) as stream:
+        _refuse_other_suffix(target)
         plan = tuned_plan(prepared, chosen, params, limits)
         writer = Writer(stream, profile=limits, copies=copies)
         quality = write_plan(writer, plan, progress)
         writer.finish()
     return summarize(writer.directory, writer.offset, quality)
+
+
+def _refuse_other_suffix(target: Target) -> None:
+    """Raise OptionError for a name of another format: its owner meant to convert."""
+    suffix = Path(target).suffix.lower() if isinstance(target, (str, os.PathLike)) else ""
+    if any(suffix in source_format.suffixes for source_format in FORMATS.values()):
+        raise OptionError(
+            f"an MCZ file must not have the suffix {suffix}; convert writes that format",
+            path=str(target),
+        )
 
 
 def encode(
@@ -361,6 +374,7 @@ def encode(
         )
         entry.write(transaction, progress)
         refuse_inputs(target, entry.inputs)
+        _refuse_other_suffix(target)
         transaction.finish()
     if entry.remark:
         warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
