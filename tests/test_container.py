@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+import zlib
 
 import pytest
 
 import mcz
 from conformance.run import VECTORS
 from mcz.codecs import codec_by_name
-from mcz.container.chunks import FOOT, HEADER
+from mcz.container.chunks import CRC, FOOT, HEADER
 from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
 from mcz.errors import FormatError, MotionError, TruncatedError, UnsupportedError
@@ -67,6 +68,17 @@ def test_salvage_takes_nothing_of_another_version_for_its_own() -> None:
     with mcz.open(data[:head] + b"\1" + data[head + 1 :], salvage=True) as file:
         assert not file.clips
         assert any("needs format 1.97" in text for text in file.damage)
+
+
+@pytest.mark.parametrize("minor", [9, 10, 99])  # 0.10 to 0.99 were drafts of 1.0
+def test_every_old_format_is_refused_with_the_way_out(minor: int) -> None:
+    data = bytearray((VECTORS / "uncommon/container/format-0-9.mcz").read_bytes())
+    head = data.index(b"HEAD")
+    end = head + HEADER.size + 5  # of HEAD, before its checksum
+    data[end - 4] = data[end - 2] = minor
+    data[end : end + 4] = CRC.pack(zlib.crc32(data[head:end]))
+    with pytest.raises(UnsupportedError, match=rf"format 0\.{minor}, .* the version of mcz that"):
+        mcz.open(bytes(data))
 
 
 def test_nothing_to_salvage() -> None:

@@ -118,7 +118,6 @@ def output_limit(file_bytes: int) -> int:
 
 
 FORMAT = 1, 0
-LAST_OLD = 0, 9  # which package 0.9 and tools/migrate_0_9 read; later drafts were not released
 FORMAT_NAME = f"{FORMAT[0]}.{FORMAT[1]}"
 
 
@@ -128,7 +127,7 @@ def _check_version(needs_minor: int, record: Container) -> bool:
     if needed > FORMAT:  # HEAD-01, CLIP-23
         raise UnsupportedError(words)
     if not needed[0]:  # HEAD-03
-        raise UnsupportedError(words, hint=Hint.OLD_FORMAT if needed <= LAST_OLD else None)
+        raise UnsupportedError(words, hint=Hint.OLD_FORMAT)
     return True
 
 
