@@ -10,6 +10,9 @@ const MINOR = 0;
 /** The version of SPEC.md that this decoder follows. */
 export const VERSION = `${MAJOR}.${MINOR}`;
 
+/** The payload of HEAD that a file is read with which has lost its own. */
+export const BASE_HEAD = Uint8Array.of(MAJOR, MINOR, MAJOR, MINOR, 0);
+
 /**
  * The version that a file or a clip needs, major x 256 + minor.
  *

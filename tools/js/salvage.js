@@ -2,15 +2,13 @@
 
 import { readDirectory } from "./directory.js";
 import { MczError, Refused } from "./errors.js";
-import { readHead } from "./head.js";
+import { BASE_HEAD, readHead } from "./head.js";
 import { decodedLimit } from "./limits.js";
 import { overlaid } from "./overlay.js";
 import { Ranges } from "./ranges.js";
 import { restored } from "./restoring.js";
 import { Scan, placeKey } from "./scan.js";
 import { directoryFrom } from "./walked.js";
-
-const BASE_HEAD = Uint8Array.of(0, 99, 0, 99, 0); // of a file that has lost its own
 
 /**
  * @param {Ranges} ranges
