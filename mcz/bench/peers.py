@@ -72,11 +72,11 @@ def _measured(loaded: Loaded, peer: Peer) -> Record:
     return _record(loaded, peer.name, peer.what, len(packed)) | rates
 
 
-def _record(loaded: Loaded, name: str, what: str, size: int) -> Record:
+def _record(loaded: Loaded, name: str, peer: str, size: int) -> Record:
     motion = loaded.motion
     return {
         "peer": name,
-        "coded": what,
+        "coded": peer,
         "coded_bytes": size,
         "cr_source": len(loaded.data) / size,
         "cr_float32": 4 * motion.signals[0].values.size / size,
@@ -117,19 +117,19 @@ def _peers(source: PeerInput) -> Iterator[Peer]:
     if "brotli" in have:
         brotli = import_module("brotli")
         general["brotli 11"] = lambda data: brotli.compress(data, quality=11), brotli.decompress
-    for what, data in ((TEXT, source.text), (MATRIX, source.matrix.tobytes())):
+    for label, data in ((TEXT, source.text), (MATRIX, source.matrix.tobytes())):
         for name, (pack, unpack) in general.items():
-            yield Peer(name, what, partial(pack, data), unpack)
+            yield Peer(name, label, partial(pack, data), unpack)
     npy = partial(_npy, source.values)
     yield Peer("npy", DOUBLES, npy, lambda data: np.load(io.BytesIO(data)))
     if "pcodec" in have:
-        for what, columns in ((ORDINALS, source.ordinals.T), (MATRIX, source.matrix.T)):
-            yield Peer("pcodec 8, a column each", what, partial(_pcodec, columns), _unpcodec)
+        for label, columns in ((ORDINALS, source.ordinals.T), (MATRIX, source.matrix.T)):
+            yield Peer("pcodec 8, a column each", label, partial(_pcodec, columns), _unpcodec)
     if "blosc2" in have:
         blosc2 = import_module("blosc2")
-        for what, matrix in ((DOUBLES, source.values), (MATRIX, source.matrix)):
+        for label, matrix in ((DOUBLES, source.values), (MATRIX, source.matrix)):
             pack = partial(_blosc2, np.ascontiguousarray(matrix))
-            yield Peer("blosc2, zstd 9, shuffle", what, pack, blosc2.decompress2)
+            yield Peer("blosc2, zstd 9, shuffle", label, pack, blosc2.decompress2)
     if "fpzip" in have:
         fpzip = import_module("fpzip")
         pack = partial(fpzip.compress, source.matrix, precision=0, order="C")
@@ -176,8 +176,8 @@ def _bounded(loaded: Loaded, matrix: Matrix) -> Iterator[Record]:
         data = zfpy.compress_numpy(matrix, tolerance=tolerance)
         values = np.asarray(zfpy.decompress_numpy(data), np.float64)
         figures = mcz.compare(motion, motion.with_values(values)).entries()
-        what = f"{MATRIX}, error of a value at most {tolerance:g}"
+        label = f"{MATRIX}, error of a value at most {tolerance:g}"
         keys = ("mse", "rms_coordinate_error", "mean_position_error", "sqnr_db")
         more = ("mean_position_error_cm", "max_position_error_cm", "virtual_marker_mean_cm")
-        record = _record(loaded, "zfp, tolerance", what, len(data))
+        record = _record(loaded, "zfp, tolerance", label, len(data))
         yield record | {"params": {"tolerance": tolerance}} | {k: figures[k] for k in keys + more}

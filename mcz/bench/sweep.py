@@ -32,11 +32,11 @@ def pareto_front(curve: RatePoints) -> tuple[Values, Values]:
     >>> pareto_front([(20, 3.0), (10, 2.0), (30, 2.5)])
     (array([10., 20.]), array([2., 3.]))
     """
-    kept: list[tuple[float, float]] = []
+    front: list[tuple[float, float]] = []
     for size, quality in sorted(curve, key=lambda point: (point[0], -point[1])):
-        if not kept or quality > kept[-1][1]:
-            kept.append((float(size), float(quality)))
-    return np.array([p[0] for p in kept]), np.array([p[1] for p in kept])
+        if not front or quality > front[-1][1]:
+            front.append((float(size), float(quality)))
+    return np.array([p[0] for p in front]), np.array([p[1] for p in front])
 
 
 def bd_rate(reference: RatePoints, other: RatePoints) -> float | None:

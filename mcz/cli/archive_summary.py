@@ -37,10 +37,10 @@ def _table(report: Report) -> Iterator[str]:
 def _summary(report: Report) -> str:
     """Counts of results, and the bytes of the sources and of the MCZ file."""
     counts = Counter(outcome.result for outcome in report.outcomes)
-    shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
-    kept = [outcome for outcome in report.outcomes if outcome.result in STORED_RESULTS]
-    size = sum(outcome.size for outcome in kept)
-    files = plural(len(report.outcomes), "file") + (f" ({shown})" if shown else "")
+    counts_text = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
+    stored = [outcome for outcome in report.outcomes if outcome.result in STORED_RESULTS]
+    size = sum(outcome.size for outcome in stored)
+    files = plural(len(report.outcomes), "file") + (f" ({counts_text})" if counts_text else "")
     if report.size is None:
         return f"{files}, {size:,} bytes"
     return f"{files}; sources {size:,} bytes, the file {report.size:,} bytes"
@@ -54,8 +54,8 @@ def _say_left_out(report: Report, target: str) -> None:
         if outcome.result == "skipped"
     )
     if kinds and report.size is not None:
-        shown = ", ".join(f"{count:,} {kind}" for kind, count in sorted(kinds.items()))
-        say(f"{target}: left out {plural(sum(kinds.values()), 'file')}: {shown}")
+        kinds_text = ", ".join(f"{count:,} {kind}" for kind, count in sorted(kinds.items()))
+        say(f"{target}: left out {plural(sum(kinds.values()), 'file')}: {kinds_text}")
 
 
 def _say_notes(report: Report) -> None:
@@ -128,9 +128,9 @@ def print_clip_results(report: Report, target: str, as_json: bool, listed: tuple
         document = {"target": target, "bytes": report.size, "counts": counts}
         print_json(document | {"names": rows, "left_out": report.left_out})
         return Exit.FINE
-    shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
+    counts_text = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
     size = "" if report.size is None else f"; the file {report.size:,} bytes"
-    echo(f"{target}: {plural(len(report.outcomes), 'name')} ({shown}){size}")
+    echo(f"{target}: {plural(len(report.outcomes), 'name')} ({counts_text}){size}")
     for outcome in report.outcomes:
         if outcome.result in listed:
             arrow = "as" if outcome.result == "renamed" else "-"

@@ -86,14 +86,14 @@ def refuse_repeats(
             return
         if isinstance(command, click.Group):
             context.allow_interspersed_args = False
-        _, _, given = command.make_parser(context).parse_args(list(arguments))
-        if any(option.is_eager for option in given):
+        _, _, present = command.make_parser(context).parse_args(list(arguments))
+        if any(option.is_eager for option in present):
             return  # --help and the like end the run
-        counts = Counter(option for option in given if isinstance(option, click.Option))
+        counts = Counter(option for option in present if isinstance(option, click.Option))
         for option, count in counts.items():
             if count > 1 and not option.multiple and not option.count:
-                shown = max((*option.opts, *option.secondary_opts), key=len)
-                raise click.UsageError(f"{shown} is given {count} times; give it once", context)
+                longest = max((*option.opts, *option.secondary_opts), key=len)
+                raise click.UsageError(f"{longest} is given {count} times; give it once", context)
 
 
 class StrictCommand(click.Command):

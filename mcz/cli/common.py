@@ -94,11 +94,11 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
     other is a bug and a traceback.
     """
     _prepare_streams()
-    given = sys.argv[1:] if arguments is None else list(arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         with _exit_on_sigterm(), _print_warnings():
             result = command.main(
-                given, prog_name=prog, standalone_mode=False, help_option_names=["-h", "--help"]
+                words, prog_name=prog, standalone_mode=False, help_option_names=["-h", "--help"]
             )
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -112,11 +112,11 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
         _give_up_output()
         return Exit.FINE
     except (click.ClickException, MczError, OSError, MemoryError) as error:
-        return _failed(error, as_json="--json" in given)
+        return _failed(error, as_json="--json" in words)
     except ImportError as error:
         if not _is_starved(error):
             raise
-        return _failed(MemoryError(), as_json="--json" in given)
+        return _failed(MemoryError(), as_json="--json" in words)
     except _Terminated:
         say("terminated")
         return Exit.TERMINATED
@@ -268,8 +268,8 @@ def require_file(path: str, of_folders: str = "") -> None:
     """
     if path != "-" and "://" not in path and not Path(path).is_file():
         is_there = f"is a folder{of_folders}" if Path(path).is_dir() else "not a file"
-        what = is_there if Path(path).exists() else "no such file"
-        raise Failure(what, path=path or repr(path), kind="AccessError")
+        problem = is_there if Path(path).exists() else "no such file"
+        raise Failure(problem, path=path or repr(path), kind="AccessError")
 
 
 def bytes_or_path(path: str) -> str | bytes:
@@ -394,7 +394,7 @@ def _intact_counts(target: str | bytes) -> str | None:
     except MczError:
         return None
     counts = ((clips, "whole clip"), (damaged, "damaged clip"), (attachments, "attachment"))
-    parts = [count_text(count, what) for count, what in counts if count]
+    parts = [count_text(count, noun) for count, noun in counts if count]
     if not parts:
         return None
     return f"it holds {', '.join(parts)}"

@@ -34,11 +34,11 @@ Part = tuple[JsonObject, bytes]  # a row of the listing, and its bytes
 def main(arguments: list[str] | None = None) -> int:
     """Answer one request; return the exit code."""
     words = sys.argv[1:] if arguments is None else arguments
-    given = _parser().parse_args(words)
-    if given.capabilities:
+    namespace = _parser().parse_args(words)
+    if namespace.capabilities:
         print(json.dumps({"options": OPTIONS}))  # noqa: T201
         return 0
-    if given.serve:
+    if namespace.serve:
         return serve(sys.stdin.buffer, sys.stdout.buffer)
     code, output = answer(sys.stdin.buffer.read(), words)
     sys.stdout.buffer.write(output)
@@ -95,7 +95,7 @@ def _refuse(code: int, error: Exception) -> int:
     return code
 
 
-def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
+def respond(data: bytes, namespace: argparse.Namespace) -> Iterator[bytes]:
     """The answer to a request about the file ``data``; raises MczError for any fault."""
     import mcz
     from mcz.container.scan import scan
@@ -104,8 +104,8 @@ def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
     # HEAD-01, STRICT-03
     scan(open_source(data), whole=True)  # INDX may be useless if a part is unsupported
     with mcz.open(data, verify=True) as file:
-        listing = "sources" if given.source else "arrays"
-        parts = list(_sources(file) if given.source else _arrays(file, given))
+        listing = "sources" if namespace.source else "arrays"
+        parts = list(_sources(file) if namespace.source else _arrays(file, namespace))
     line = json.dumps({listing: [row for row, _ in parts]}, ensure_ascii=False).encode("utf-8")
     if len(line) >= MAX_LINE:
         raise LimitError(f"a listing of {len(line)} bytes, the contract allows {MAX_LINE}")
@@ -114,22 +114,22 @@ def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
         yield content
 
 
-def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
+def _arrays(file: File, namespace: argparse.Namespace) -> Iterator[Part]:
     from mcz.files.reading.signal_info import read_segments
 
     for attachment in file.attachments.values():
         attachment.read()
     clips: Iterable[Clip] = file.clips.values()
-    if given.clip is not None:  # by its name, and no other way
-        if given.clip not in file.clips.rows:
-            raise OptionError(f"no clip {given.clip!r}")
-        clips = [file.only_clip(given.clip)]
+    if namespace.clip is not None:  # by its name, and no other way
+        if namespace.clip not in file.clips.rows:
+            raise OptionError(f"no clip {namespace.clip!r}")
+        clips = [file.only_clip(namespace.clip)]
     lacking: UnsupportedError | None = None
     for clip in clips:
         _ = clip.frame_numbers
         for signal in clip.signals:
             try:
-                yield from _signal_arrays(clip, signal, given)
+                yield from _signal_arrays(clip, signal, namespace)
             except UnsupportedError as error:
                 lacking = lacking or error  # STRICT-05
                 read_segments(clip.container, signal)  # STRICT-05
@@ -137,25 +137,25 @@ def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
         raise lacking
 
 
-def _signal_arrays(clip: Clip, signal: SignalInfo, given: argparse.Namespace) -> Iterator[Part]:
+def _signal_arrays(clip: Clip, signal: SignalInfo, namespace: argparse.Namespace) -> Iterator[Part]:
     """The canonical array of a signal, then its mask if any value is invalid."""
-    if given.joints is not None and signal.channels is not None:
+    if namespace.joints is not None and signal.channels is not None:
         return
-    resolution = signal.coarser(given.resolution) if signal.index else given.resolution
-    values, mask = _values(clip, given, resolution, signal.index)
+    resolution = signal.coarser(namespace.resolution) if signal.index else namespace.resolution
+    values, mask = _values(clip, namespace, resolution, signal.index)
     yield _part(clip.name, signal.name, "values", values)
     if mask is not None and not mask.all():
         yield _part(clip.name, signal.name, "mask", mask)
 
 
 def _values(
-    clip: Clip, given: argparse.Namespace, resolution: int, signal: int
+    clip: Clip, namespace: argparse.Namespace, resolution: int, signal: int
 ) -> tuple[Values, NDArray[np.bool_] | None]:
-    if given.post_filter and not signal:  # FILT-01
+    if namespace.post_filter and not signal:  # FILT-01
         from mcz.files.reading.post_filtering import FilteredClip
 
         clip = FilteredClip(clip)
-    return clip.read_masked(given.frames, given.joints, resolution, signal=signal)
+    return clip.read_masked(namespace.frames, namespace.joints, resolution, signal=signal)
 
 
 def _part(clip: str, signal: str, array: str, values: Values | NDArray[np.bool_]) -> Part:

@@ -144,12 +144,12 @@ def decode_command(
     """
     options = DecodeOptions(**settings)
     refuse(unverified and salvage, "--salvage needs the checksums; leave out --unverified")
-    given = Input(file, salvage=salvage, unverified=unverified, max_decoded=max_decoded)
-    return decode(given, options, output, names=names, where=where, force=force, as_json=as_json)
+    source = Input(file, salvage=salvage, unverified=unverified, max_decoded=max_decoded)
+    return decode(source, options, output, names=names, where=where, force=force, as_json=as_json)
 
 
 def decode(
-    given: Input,
+    source: Input,
     options: DecodeOptions,
     output: str | None,
     *,
@@ -159,20 +159,20 @@ def decode(
     as_json: bool,
 ) -> Exit:
     """Write the requested outputs of an input, and report them."""
-    file, salvage = given.file, given.salvage
+    file, salvage = source.file, source.salvage
     if output == "-" and (as_json or options.with_skeleton):
         raise JsonRefused(
             "-o - writes to standard output, so it excludes --json and --with-skeleton", Exit.USAGE
         )
-    if given.is_source:
-        given, options = given.with_facts(options)
+    if source.is_source:
+        source, options = source.with_facts(options)
         refuse(output is None and options.target is None, f"{file}: {SOURCE_GIVEN}")
     if target_of(suffix_of(output)) is None:
         check_options(options, salvage)
         check_signal(options)
     outputs: list[Output] = []
     summaries: dict[str, ConversionSummary] = {}
-    with given.open_file() as (opened, inputs):
+    with source.open_file() as (opened, inputs):
         for clip in _select_clips(opened, output, names, where):
             clip_options = _with_target(clip, output, options, salvage)
             parts, summaries[clip.name] = clip_outputs(opened, clip, clip_options)
@@ -228,8 +228,8 @@ def _output_without_clips(file: File, names: tuple[str, ...]) -> Output:
         return skeleton_output(file, file.skeletons[0][0])
     name = next(iter(names or attachments), "")
     if name not in file.attachments or (not names and len(attachments) > 1):
-        shown = ", ".join(attachments) or "nothing"
-        raise Failure(f"there are no clips; choose one of {shown} with --clip", Exit.USAGE)
+        listing = ", ".join(attachments) or "nothing"
+        raise Failure(f"there are no clips; choose one of {listing} with --clip", Exit.USAGE)
     data = file.attachments[name].read()
     return Output("attachment", PurePosixPath(name).name, data, RESTORED)
 
@@ -283,7 +283,7 @@ def convert_command(
     """
     facts = {name: options.pop(name) for name in OF_SOURCES}
     choice = DecodeOptions(**options)
-    given = Input(file, max_decoded=max_decoded, facts=facts)
+    source = Input(file, max_decoded=max_decoded, facts=facts)
     suffix = suffix_of(output)
     refuse(
         not suffix and choice.target is None,
@@ -291,11 +291,13 @@ def convert_command(
     )
     if suffix != ".mcz" or choice.target is not None:
         refuse(
-            not given.is_source and any(facts.values()),
+            not source.is_source and any(facts.values()),
             f"{', '.join(f'--{name}' for name in OF_SOURCES)} need a source file, not {file}",
         )
-        return decode(given, choice, output, names=names, where=where, force=force, as_json=as_json)
-    refuse(not given.is_source, f"{output}: use mcz extract for clips of an .mcz")
+        return decode(
+            source, choice, output, names=names, where=where, force=force, as_json=as_json
+        )
+    refuse(not source.is_source, f"{output}: use mcz extract for clips of an .mcz")
     has_parts = bool(names or where or choice.frames or choice.joints)
     refuse(has_parts, f"{output}: an .mcz is made from a whole file; cut it with mcz extract")
     from mcz.cli.encode import encode_command

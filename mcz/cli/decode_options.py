@@ -93,9 +93,9 @@ def check_signal(options: DecodeOptions) -> None:
         options.signal is not None and other,
         "--signal excludes --joints, --preview and --post-filter",
     )
-    shown = options.is_scene
+    is_picture = options.is_scene
     refuse(
-        options.up is not None and not (shown or options.target == "c3d"),
+        options.up is not None and not (is_picture or options.target == "c3d"),
         f"--up needs --to {' or '.join(('c3d', *SCENES))}",
     )
     refuse(
@@ -137,8 +137,8 @@ class Input:
         """Move the facts from the options of a source file to the input; return both."""
         refuse(self.salvage or self.unverified, "--salvage and --unverified need an .mcz")
         facts = {"unit": options.unit, "up": options.up, "rate": options.rate}
-        given = replace(self, facts=dict(self.facts) | facts)
-        return given, options._replace(unit=None, up=None, rate=None)
+        merged = replace(self, facts=dict(self.facts) | facts)
+        return merged, options._replace(unit=None, up=None, rate=None)
 
     @contextmanager
     def open_file(self) -> Iterator[tuple[File, tuple[str, ...]]]:

@@ -188,13 +188,13 @@ def replace_command(
     require_file(file)
     require_file(table)
     output = output and resolve_output(output, file)
-    shown = output or file
+    target = output or file
     with errors_about(file):
         if output is not None and Path(output).exists() and Path(output).samefile(file):
             raise Failure(
                 "the output is IN.mcz itself; use --in-place to change it", Exit.USAGE, path=output
             )
-        refuse_inputs(shown, (table,))
+        refuse_inputs(target, (table,))
         with mcz.open(file) as opened_file:
             values = read_values(table, opened_file.only_clip(name), joint)
         with Progress() as progress:
@@ -211,14 +211,14 @@ def replace_command(
                 progress=progress,
             )
     if as_json:
-        print_json({"output": shown, **asdict(result)})
+        print_json({"output": target, **asdict(result)})
         return Exit.FINE
     coded = f"{result.joint} of {result.clip}" + (", re-encoded" if result.is_recoded else "")
-    line = f"{shown}: {result.size:,} bytes; {coded}: {result.joint_bytes:,}"
+    line = f"{target}: {result.size:,} bytes; {coded}: {result.joint_bytes:,}"
     echo(f"{line} of {result.joint_bytes_before:,} bytes, {result.codec}")
     if result.is_recoded:
-        off = f"{result.max_error:.3g}, others {result.others_error:.3g}"
-        echo(f"  greatest error, in units of the source: {result.joint} {off}")
+        errors = f"{result.max_error:.3g}, others {result.others_error:.3g}"
+        echo(f"  greatest error, in units of the source: {result.joint} {errors}")
     if result.n_exceptions or result.n_exceptions_before:
         before = f"{result.n_exceptions_before:,} before"
         line = f"  {plural(result.n_exceptions, 'number')} of the joint off the grid, {before}"

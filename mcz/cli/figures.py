@@ -106,9 +106,9 @@ def _rows(figures: Mapping[str, str]) -> Iterator[list[str]]:
             yield [key, _number(value), unit, "", note]
 
 
-def _where(figures: Mapping[str, str], metric: str, what: str) -> str:
+def _where(figures: Mapping[str, str], metric: str, label: str) -> str:
     """The place of a maximum, if recorded: ``frame 7, point Head``."""
-    words = ("frame", what)
+    words = ("frame", label)
     return ", ".join(f"{w} {figures[f'{metric}_{w}']}" for w in words if f"{metric}_{w}" in figures)
 
 

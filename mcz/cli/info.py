@@ -339,14 +339,14 @@ def _clip_ratio(clip: JsonObject) -> str:
 
 
 def _notes(clips: list[JsonObject]) -> Iterator[str]:
-    named: dict[str, list[str]] = {}
+    clips_by_note: dict[str, list[str]] = {}
     for clip in clips:
         for key in NOTES:
             if text := clip["metadata"].get(key):
-                named.setdefault(f"{key}  {text[:WIDEST]}", []).append(clip["name"])
-    if named:
+                clips_by_note.setdefault(f"{key}  {text[:WIDEST]}", []).append(clip["name"])
+    if clips_by_note:
         yield ""
-    for note, names in named.items():
+    for note, names in clips_by_note.items():
         yield f"{note}: {first_names(names, CLIPS_IN_FULL)}"
 
 

@@ -28,7 +28,7 @@ def is_cheap(clip: Any) -> bool:
     return bool(clip.n_frames * clip.n_channels <= CHEAP)
 
 
-def motion_energy(moving: MotionLike, cells: int = CELLS) -> Floats | None:
+def motion_energy(motion: MotionLike, cells: int = CELLS) -> Floats | None:
     """The mean speed of all points in ``cells`` equal parts of the frames, float64 (n,).
 
     In length units a second, or a frame if times are unknown; NaN where no position is known. No
@@ -36,49 +36,49 @@ def motion_energy(moving: MotionLike, cells: int = CELLS) -> Floats | None:
     more segments than parts one segment a part is decoded. None without kinematics, or with fewer
     than two frames.
     """
-    if moving.n_frames < 2:
+    if motion.n_frames < 2:
         return None
-    cells = min(cells, moving.n_frames - 1)
-    edges = np.linspace(0, moving.n_frames - 1, cells + 1).astype(np.int64)
-    signal: Any = moving.signals[0]
-    sampled = not isinstance(moving, Motion) and len(signal.rows) > cells
+    cells = min(cells, motion.n_frames - 1)
+    edges = np.linspace(0, motion.n_frames - 1, cells + 1).astype(np.int64)
+    signal: Any = motion.signals[0]
+    sampled = not isinstance(motion, Motion) and len(signal.rows) > cells
     try:
         with np.errstate(all="ignore"):
-            return _sampled(moving, edges) if sampled else _full_speeds(moving, edges)
+            return _sampled(motion, edges) if sampled else _full_speeds(motion, edges)
     except MczError:  # no kinematics, or damaged
         return None
 
 
-def _seconds(moving: MotionLike) -> Floats:
+def _seconds(motion: MotionLike) -> Floats:
     """Seconds from each frame to the next, NaN across a break; 1 if times are unknown."""
-    timeline = moving.timeline
-    return np.ones(moving.n_frames - 1) if timeline is None else timeline.steps
+    timeline = motion.timeline
+    return np.ones(motion.n_frames - 1) if timeline is None else timeline.steps
 
 
-def _full_speeds(moving: MotionLike, edges: Any) -> Floats:
+def _full_speeds(motion: MotionLike, edges: Any) -> Floats:
     from mcz.kinematics.poses import positions
 
-    width = max(1, moving.skeleton.n_channels + 12 * moving.skeleton.n_joints)
+    width = max(1, motion.skeleton.n_channels + 12 * motion.skeleton.n_joints)
     size = max(1, BLOCK // width)
-    means = np.full(moving.n_frames - 1, np.nan)
+    means = np.full(motion.n_frames - 1, np.nan)
     for start in range(0, len(means), size):
         stop = min(start + size, len(means))
-        means[start:stop] = _steps(positions(moving, frames=(start, stop + 1)))
-    means /= _seconds(moving)
+        means[start:stop] = _steps(positions(motion, frames=(start, stop + 1)))
+    means /= _seconds(motion)
     known = np.isfinite(means)
     counts = np.add.reduceat(known, edges[:-1])
     sums: Floats = np.add.reduceat(np.where(known, means, 0.0), edges[:-1])
     return sums / np.where(counts, counts, np.nan)
 
 
-def _sampled(moving: MotionLike, edges: Any) -> Floats:
+def _sampled(motion: MotionLike, edges: Any) -> Floats:
     from mcz.kinematics.poses import positions
 
     middles = (edges[:-1] + edges[1:]) // 2
     samples = np.array(
-        [_steps(positions(moving, frames=(at, at + 2)))[0] for at in middles.tolist()]
+        [_steps(positions(motion, frames=(at, at + 2)))[0] for at in middles.tolist()]
     )
-    speeds: Floats = samples / _seconds(moving)[middles]
+    speeds: Floats = samples / _seconds(motion)[middles]
     return speeds
 
 
@@ -222,9 +222,9 @@ def array_lines(arrays: list[JsonObject] | None) -> Iterator[str]:
             order = ", by columns" if array["order"] == "F" else ""
             columns = plural(array["columns"], "column")
             yield f"  array      {name}: {columns} of {array['type']}{order}, in {array['signal']}"
-    kept = [array["name"] for array in arrays if array["signal"] is None]
-    if kept:
-        yield f"  kept       as bytes: {', '.join(kept)}"
+    byte_arrays = [array["name"] for array in arrays if array["signal"] is None]
+    if byte_arrays:
+        yield f"  kept       as bytes: {', '.join(byte_arrays)}"
 
 
 def _recording_facts(recording: JsonObject) -> Iterator[str]:
@@ -244,8 +244,8 @@ def _recording_facts(recording: JsonObject) -> Iterator[str]:
 def _rows(heads: list[str], rows: list[list[str]], align: str) -> Iterator[str]:
     if not rows:
         return
-    shown = table([heads, *rows[:MOST_ROWS]], align)
-    yield from (f"    {line}".rstrip() for line in shown)
+    lines = table([heads, *rows[:MOST_ROWS]], align)
+    yield from (f"    {line}".rstrip() for line in lines)
     if len(rows) > MOST_ROWS:
         yield f"    {len(rows) - MOST_ROWS} more; --json lists them"
 

@@ -122,21 +122,21 @@ def check_count(output: str | None, count: int) -> None:
 
 
 def write_outputs(
-    given: Sequence[str],
+    files: Sequence[str],
     output: str | None,
     outputs: Sequence[Output],
     force: bool,
     as_json: bool,
     facts: JsonObject,
 ) -> None:
-    """Write the outputs of the ``given`` files, the first as the main one, and print a summary.
+    """Write the outputs of the ``files`` files, the first as the main one, and print a summary.
 
     Obstacles of any output are found before the first is written.
     """
     from mcz.files.writing.atomic import refuse_inputs
 
-    file = given[0]
-    inputs = [sys.stdin if path == "-" else path for path in given]
+    file = files[0]
+    inputs = [sys.stdin if path == "-" else path for path in files]
     if output == "-":
         refuse_inputs(sys.stdout, inputs)
         data = outputs[0].data
@@ -166,12 +166,12 @@ def write_outputs(
 
 def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Path]:
     """The path of each output; a name given by the user is the first output's."""
-    named = output is not None and not is_folder(output)
+    is_named = output is not None and not is_folder(output)
     folder = Path() if file == "-" else Path(file).parent
     if output is not None:
-        folder = Path(output).parent if named else Path(output)
+        folder = Path(output).parent if is_named else Path(output)
     paths = [folder / plain_name(each.name) for each in outputs]
-    return [Path(str(output)), *paths[1:]] if named else paths
+    return [Path(str(output)), *paths[1:]] if is_named else paths
 
 
 def plain_name(name: str) -> str:

@@ -176,9 +176,9 @@ def render_command(
         document["bytes"] = document.pop("n_bytes")
         print_json(document)
         return Exit.FINE
-    what = plural(drawn.n_pictures, "picture" if drawn.fps else "pose")
+    noun = plural(drawn.n_pictures, "picture" if drawn.fps else "pose")
     at = f" at {drawn.fps:g} a second" if drawn.fps else ""
-    echo(f"{target}: {what}{at}, {drawn.width} x {drawn.height} pixels, {drawn.n_bytes:,} bytes")
+    echo(f"{target}: {noun}{at}, {drawn.width} x {drawn.height} pixels, {drawn.n_bytes:,} bytes")
     return Exit.FINE
 
 
@@ -298,7 +298,7 @@ def _plot_lines(target: str, plotted: Any) -> Iterator[str]:
     yield f"{target}: {plotted.title}"
     for rows in plotted.tables:
         more = len(rows) - 1 - MOST_ROWS
-        shown = [list(row) for row in rows[: MOST_ROWS + 1]]
-        yield from (f"  {line}" for line in table(shown, "l" + "r" * (len(rows[0]) - 1)))
+        lines = [list(row) for row in rows[: MOST_ROWS + 1]]
+        yield from (f"  {line}" for line in table(lines, "l" + "r" * (len(rows[0]) - 1)))
         if more > 0:
             yield f"  {more:,} more rows; --json and a .html have them"

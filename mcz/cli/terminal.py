@@ -38,14 +38,14 @@ class StatusLine:
         """Show as much of ``text`` as fits, in place of the line before."""
         import shutil
 
-        room, width, shown = shutil.get_terminal_size().columns - 1, 0, ""
+        n_columns, width, line = shutil.get_terminal_size().columns - 1, 0, ""
         for letter in printable(text):
             width += columns_of(letter)
-            if width > room:
+            if width > n_columns:
                 width -= columns_of(letter)
                 break
-            shown += letter
-        click.echo(f"\r{shown}{' ' * (self._width - width)}", err=True, nl=False)
+            line += letter
+        click.echo(f"\r{line}{' ' * (self._width - width)}", err=True, nl=False)
         self._width = width
 
     def remove(self) -> None:
@@ -212,13 +212,13 @@ class Progress:
         self._due = time.monotonic() + PATIENCE
         self._is_shown = sys.stderr is not None and sys.stderr.isatty()
 
-    def __call__(self, done: int, total: int, what: str) -> None:
+    def __call__(self, done: int, total: int, label: str) -> None:
         now = time.monotonic()
         if self._is_shown and now >= self._due:
             self._due = now + INTERVAL
             share = min(done / total, 1.0) if total > 0 else 1.0
             bar = "#" * int(BAR * share)
-            STATUS.show(f"[{bar:-<{BAR}}] {share:4.0%} {what}")
+            STATUS.show(f"[{bar:-<{BAR}}] {share:4.0%} {label}")
 
     def __enter__(self) -> Progress:
         return self

@@ -139,8 +139,8 @@ def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
         raise Failure("a page must be an .html; for films, use mcz render", Exit.USAGE, path=output)
     if output == "-":
         raise Failure("a page must be written to a file, not to standard output", Exit.USAGE)
-    usual = {"no_browser": False, "keep": False, "host": LOOPBACK, "port": 0}
-    of_server = [key for key in OF_SERVER if options[key] != usual[key]]
+    defaults = {"no_browser": False, "keep": False, "host": LOOPBACK, "port": 0}
+    of_server = [key for key in OF_SERVER if options[key] != defaults[key]]
     if in_rerun:
         wrong = ("codec", "effort", "params", "most", *(() if output else ("force",)))
         other, why = [*of_server, *(k for k in wrong if options[k])], "without rerun"
@@ -150,8 +150,8 @@ def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
     else:
         other, why = [key for key in OF_PAGE if options[key]], "with -o OUT.html"
     if other:
-        shown = {"clips": "clip", "params": "param", "most": "max-size"}.get(other[0], other[0])
-        raise Failure(f"--{shown.replace('_', '-')} applies only {why}", Exit.USAGE)
+        option = {"clips": "clip", "params": "param", "most": "max-size"}.get(other[0], other[0])
+        raise Failure(f"--{option.replace('_', '-')} applies only {why}", Exit.USAGE)
 
 
 def _serve(
@@ -317,15 +317,15 @@ def _log_clips(
 def _clips(registry: FileRegistry, options: Settings) -> Iterator[tuple[str, Clip]]:
     from mcz.files.reading.file import open
 
-    for _, given in registry.initial_files():
+    for _, registered in registry.initial_files():
         with (
-            errors_about(given.source),
+            errors_about(registered.source),
             open(
-                given.target(), salvage=options["salvage"], max_decoded=options["max_decoded"]
+                registered.target(), salvage=options["salvage"], max_decoded=options["max_decoded"]
             ) as file,
         ):
             for clip in file.select_clips(options["clips"] or None, options["where"]):
-                yield given.name, clip
+                yield registered.name, clip
 
 
 def _complete(clip: Clip, options: Settings) -> Clip | Motion:
@@ -333,7 +333,9 @@ def _complete(clip: Clip, options: Settings) -> Clip | Motion:
     skeleton = clip.skeleton
     unknown = (clip.frame_rate is None, skeleton.unit_cm is None, not skeleton.up_axis)
     facts = [options[fact] for fact in FACTS]
-    if not any(there and fact is not None for there, fact in zip(unknown, facts, strict=True)):
+    if not any(
+        is_unknown and fact is not None for is_unknown, fact in zip(unknown, facts, strict=True)
+    ):
         return clip
     from mcz.files.reading.source_files import SourceOptions
 

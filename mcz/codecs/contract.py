@@ -328,8 +328,8 @@ class Codec:
     def settings(self, options: Params) -> Settings:
         """Return ``options`` as quality records store them, without inner ones."""
         known = {parameter.name: parameter for parameter in (*self.parameters, *TARGETS)}
-        shown = {name: known[name].recorded_value(value) for name, value in options.items()}
-        return {name: value for name, value in shown.items() if not known[name].inner}
+        recorded = {name: known[name].recorded_value(value) for name, value in options.items()}
+        return {name: value for name, value in recorded.items() if not known[name].inner}
 
     @property
     def all_parameters(self) -> tuple[Parameter, ...]:
@@ -350,21 +350,21 @@ class Codec:
             "parameters": [p.document() for p in self.all_parameters if not p.inner],
         }
 
-    def options(self, given: Params, *, inner: bool = False) -> Settings:
+    def options(self, params: Params, *, inner: bool = False) -> Settings:
         """Return all parameters, given ones parsed; raises OptionError for an unknown or bad one.
 
         ``inner`` permits parameters that only a search sets.
         """
         known = {parameter.name: parameter for parameter in self.all_parameters}
-        listed = [name for name, parameter in known.items() if inner or not parameter.inner]
-        unknown = sorted(set(given) - set(listed))
+        names = [name for name, parameter in known.items() if inner or not parameter.inner]
+        unknown = sorted(set(params) - set(names))
         if unknown:
             raise OptionError(
                 f"codec {self.name} has no parameter {unknown[0]!r}; its parameters are "
-                f"{', '.join(listed) or 'none'}"
+                f"{', '.join(names) or 'none'}"
             )
         return {
-            name: parameter.parse(given[name]) if name in given else parameter.default
+            name: parameter.parse(params[name]) if name in params else parameter.default
             for name, parameter in known.items()
         }
 

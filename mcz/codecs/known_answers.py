@@ -100,8 +100,8 @@ def check_known_answer(codec: Codec) -> None:
     answer = known_answers().get(name)
     if answer is None:
         return
-    listed = CODECS.get(name)
-    if listed is None or codec.decode not in (listed.decode, *listed.earlier.values()):
+    registered = CODECS.get(name)
+    if registered is None or codec.decode not in (registered.decode, *registered.earlier.values()):
         return
     with _LOCK:
         if name in _proved:

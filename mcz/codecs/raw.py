@@ -57,11 +57,11 @@ def _build_stream(ordinals: Ints) -> bytes:
     return b"".join(parts)
 
 
-def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
+def recode(request: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     """The streams of some groups with new values."""
-    groups = [list(asked.source.layout.groups[group]) for group in asked.groups]
-    for span in asked.spans:
-        ordinals = asked.source.ordinals(span.first, span.stop)
+    groups = [list(request.source.layout.groups[group]) for group in request.groups]
+    for span in request.spans:
+        ordinals = request.source.ordinals(span.first, span.stop)
         yield tuple(_build_stream(ordinals[:, columns]) for columns in groups)
 
 

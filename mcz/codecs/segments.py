@@ -41,11 +41,11 @@ def lossless_segment_frames(size: str, most: int) -> Parameter:
     )
 
 
-def segment_frames_of(layout: Layout, given: int | None, *, as_published: bool = False) -> int:
+def segment_frames_of(layout: Layout, option: int | None, *, as_published: bool = False) -> int:
     """Frames per segment; 0: by size. Published methods take the whole clip at once."""
-    if given is None:
+    if option is None:
         return layout.n_frames if as_published else 0
-    return given
+    return option
 
 
 Streams = tuple[bytes, ...]
@@ -136,16 +136,16 @@ class SegmentPrefetch(AbstractContextManager["SegmentPrefetch"]):
         """Return the streams of ``span``; ``following`` only affects the speed."""
         if self._threads < 2:
             return self._prepare(*span)()
-        due = [span, *islice(following, self._threads)]
+        batch = [span, *islice(following, self._threads)]
         if self._pool is None:
-            if len(due) < 2:
+            if len(batch) < 2:
                 return self._prepare(*span)()
             from concurrent.futures import ThreadPoolExecutor  # on first use
 
             self._pool = ThreadPoolExecutor(self._threads)
-        for other in self._pending.keys() - set(due):
+        for other in self._pending.keys() - set(batch):
             self._pending.pop(other).cancel()
-        for other in due:
+        for other in batch:
             if other not in self._pending:
                 self._pending[other] = self._pool.submit(self._prepare(*other))
         return self._pending.pop(span).result()

@@ -249,9 +249,9 @@ def _check_heads(
     n_due = len(n_points) + sum(bool(flags & flag) for flag in (COURSES, MEAN))
     if len(heads) != n_due:  # BASES-02, SPACE-06
         raise FormatError(f"{name}: the model has {len(heads)} bases; expected {n_due}")
-    for head, due in zip(heads, n_points, strict=False):
-        if head.n_points != due:  # SPACE-07
-            raise FormatError(f"{name}: vectors of {head.n_points} entries for {due} points")
+    for head, expected in zip(heads, n_points, strict=False):
+        if head.n_points != expected:  # SPACE-07
+            raise FormatError(f"{name}: vectors of {head.n_points} entries for {expected} points")
     # SPACE-06, SPACE-07
     if flags & MEAN and (len(heads[-1].shifts), heads[-1].n_points) != (1, n_channels):
         shape = len(heads[-1].shifts), heads[-1].n_points

@@ -149,8 +149,8 @@ def default_step(sample: Sample) -> float:
     return min(max(spread * DEFAULT_SHARE, LEAST), MOST) if 0 < spread < math.inf else 1.0
 
 
-def choose_space(name: str, sample: Sample, step: float, which: str, in_time: InTime) -> Choice:
-    """Choose the bases that ``which`` names, or those with the smallest estimated size.
+def choose_space(name: str, sample: Sample, step: float, basis: str, in_time: InTime) -> Choice:
+    """Choose the bases that ``basis`` names, or those with the smallest estimated size.
 
     ``in_time`` is the codec's transform over time before the one in space. Raises OptionError if
     the named one does not fit.
@@ -167,18 +167,18 @@ def choose_space(name: str, sample: Sample, step: float, which: str, in_time: In
         return Choice(fields)
     n_points = [part.shape[1] for part in sample.matrices(frames)]
     candidates: list[tuple[Choice, list[Floats]]] = []
-    if which in ("auto", "cosines") or not len(frames):
+    if basis in ("auto", "cosines") or not len(frames):
         candidates.append((Choice(fields), [dct_matrix(n) for n in n_points]))
-    known = [m for m in known_models().values() if _fits(m, n_points)] if which != "learned" else []
-    if which in ("auto", "known"):
+    known = [m for m in known_models().values() if _fits(m, n_points)] if basis != "learned" else []
+    if basis in ("auto", "known"):
         candidates += [(_with_model(fields, known=model), _vectors(model)) for model in known]
-    if len(frames) and (which == "learned" or (which == "auto" and not known)):
+    if len(frames) and (basis == "learned" or (basis == "auto" and not known)):
         model = learn_model(sample)
         candidates.append((_with_model(fields, model=model), _vectors(model)))
-    if which not in WHICH:
-        model = _read_model(which)
+    if basis not in WHICH:
+        model = _read_model(basis)
         if not _fits(model, n_points):
-            raise OptionError(f"{name}: the bases of {which} do not fit {n_points} points")
+            raise OptionError(f"{name}: the bases of {basis} do not fit {n_points} points")
         candidates.append((_with_model(fields, model=model), _vectors(model)))
     if not candidates:
         raise OptionError(f"{name}: no well-known bases have {n_points} points")
@@ -188,20 +188,20 @@ def choose_space(name: str, sample: Sample, step: float, which: str, in_time: In
     return candidates[sizes.index(min(sizes))][0]
 
 
-def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Choice:
+def live_choice(name: str, layout: Layout, step: float | None, basis: str) -> Choice:
     """The same before any frame is known: well-known bases if there are some, or cosines.
 
-    Raises OptionError without a step, or if ``which`` names bases of the motion itself.
+    Raises OptionError without a step, or if ``basis`` names bases of the motion itself.
     """
     if step is None:
         raise OptionError(f"{name}: a live stream needs a step")
-    sample, which = live_sample(name, layout, which)
-    return choose_space(name, sample, step, which, frame_differences)
+    sample, basis = live_sample(name, layout, basis)
+    return choose_space(name, sample, step, basis, frame_differences)
 
 
-def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
+def live_sample(name: str, layout: Layout, basis: str) -> tuple[Sample, str]:
     """A sample without frames, and the bases available then; raises OptionError for others."""
-    if which == "learned":
+    if basis == "learned":
         raise OptionError(
             f"{name}: basis=learned needs all frames; learn a basis beforehand with mcz train"
         )
@@ -210,7 +210,7 @@ def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
     if n_points > MAX_POINTS:
         raise MotionError(f"{name}: {n_points} points exceed the {MAX_POINTS} of a matrix")
     sample = _sample(skeleton, [np.zeros((1, layout.n_channels))], 0)
-    return sample, basis_at_hand(sample) if which == "auto" else which
+    return sample, basis_at_hand(sample) if basis == "auto" else basis
 
 
 def basis_at_hand(sample: Sample) -> str:

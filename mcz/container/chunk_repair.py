@@ -93,9 +93,9 @@ def _mend_headers(source: ByteSource, scanned: ScanResult) -> Iterator[tuple[int
     left = MOST_READ * source.size
     for offset, chunk in scanned.broken:
         if chunk is None and offset + HEADER.size <= source.size:
-            given = int.from_bytes(source.read(offset, HEADER.size), "little")
+            stated = int.from_bytes(source.read(offset, HEADER.size), "little")
             for bit in range(8 * HEADER.size):
-                header = (given ^ 1 << bit).to_bytes(HEADER.size, "little")
+                header = (stated ^ 1 << bit).to_bytes(HEADER.size, "little")
                 with suppress(FormatError):
                     mended = parse_chunk_header(header, offset)
                     if mended.type == ChunkType.COPY:  # copies are written again
@@ -186,10 +186,10 @@ def _fault_of(source: ByteSource, copy: Copy) -> str:
 
 def owners_of(source: ByteSource, scanned: ScanResult) -> dict[tuple[int, int], str]:
     """Owners of segments and CENDs, from the last intact index; see ``scan``."""
-    listed = _read_last_index(source, scanned)
+    index = _read_last_index(source, scanned)
     owners: dict[tuple[int, int], str] = {}
     with suppress(FormatError):
-        for name, clip in listed.clips.items() if listed is not None else ():
+        for name, clip in index.clips.items() if index is not None else ():
             owners |= {(row.offset, row.size): name for row in clip.segments}
             if clip.cend is not None:
                 owners[clip.cend.offset, clip.cend.size] = name
@@ -216,13 +216,13 @@ def restore_from_index(source: ByteSource, scanned: ScanResult) -> list[str]:
     Without an index it gets the HEAD of this version. Returns the lost parts.
     """
     directory, notes = scanned.directory, []
-    listed = _read_last_index(source, scanned)
-    if listed is not None and not directory.head:
+    index = _read_last_index(source, scanned)
+    if index is not None and not directory.head:
         with suppress(FormatError):
-            parse_head(listed.head)
-            directory.head = listed.head
+            parse_head(index.head)
+            directory.head = index.head
             notes.append("HEAD is lost; it is taken from the index")
-    for name, (of, target) in listed.aliases.items() if listed is not None else ():
+    for name, (of, target) in index.aliases.items() if index is not None else ():
         if name not in directory.aliases:
             directory.aliases[name] = of, target
             notes.append(f"alias {name!r} is lost; it is taken from the index")
@@ -237,5 +237,5 @@ def restore_from_index(source: ByteSource, scanned: ScanResult) -> list[str]:
 
 def is_like(source: ByteSource, offset: int, chunk: bytes) -> bool:
     """Return True if most bytes at ``offset`` equal those of ``chunk``."""
-    there = source.read(offset, max(0, min(len(chunk), source.size - offset)))
-    return bool(4 * sum(map(eq, there, chunk)) >= 3 * len(chunk))
+    present = source.read(offset, max(0, min(len(chunk), source.size - offset)))
+    return bool(4 * sum(map(eq, present, chunk)) >= 3 * len(chunk))

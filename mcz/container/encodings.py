@@ -292,7 +292,7 @@ def check_copies(
     """Compare the COPY ``chunk`` with the chunks ``before`` it, in file order."""
     for copy in copies:
         at = bisect_left(before, copy.offset, key=lambda other: other.offset)
-        there = before[at] if at < len(before) else None
-        same = there is not None and (there.offset, there.type) == (copy.offset, copy.type)
-        if there is None or not same or payload_of(there) != copy.payload:  # COPY-02
+        original = before[at] if at < len(before) else None
+        same = original is not None and (original.offset, original.type) == (copy.offset, copy.type)
+        if original is None or not same or payload_of(original) != copy.payload:  # COPY-02
             raise FormatError(f"{copy.label} differs from its copy", where=f"chunk {chunk.label}")

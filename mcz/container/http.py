@@ -328,9 +328,9 @@ class HttpFile(io.RawIOBase):
             self._conditions = {"If-Unmodified-Since": date}
         return whole, tail
 
-    def _answer(self, asked: str, most: int) -> Answer:
+    def _answer(self, span: str, most: int) -> Answer:
         headers = {
-            "Range": f"bytes={asked}",
+            "Range": f"bytes={span}",
             "Accept-Encoding": "identity",
             "User-Agent": "mcz",
             **self._conditions,

@@ -41,15 +41,17 @@ SIGNAL_ROW = attrgetter(*(f.name for f in fields(SignalRow)))
 
 def build_index(directory: Directory) -> bytes:
     """The whole INDX chunk, which continues the present ones of the file if they are larger."""
-    kept = list(directory.indexes)
+    indexes = list(directory.indexes)
     while True:
-        content = index_content(directory, kept[-1] if kept else None)
-        if not kept or not (kept[-1].n_bytes < GROWTH * len(content) or len(kept) >= INDEXES):
+        content = index_content(directory, indexes[-1] if indexes else None)
+        if not indexes or not (
+            indexes[-1].n_bytes < GROWTH * len(content) or len(indexes) >= INDEXES
+        ):
             break
-        kept.pop()
+        indexes.pop()
     record = Indx(size=len(content), data=deflate(content))
-    if kept:
-        record.flags, record.previous = CONTINUES, kept[-1].chunk
+    if indexes:
+        record.flags, record.previous = CONTINUES, indexes[-1].chunk
     return build_chunk(ChunkType.INDX, build(record, "INDX"), ChunkFlag.ANCILLARY)
 
 

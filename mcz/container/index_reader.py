@@ -99,15 +99,15 @@ def index_name(data: bytes, offset: int) -> PreviousIndex:
 
 def read_indexes(fetch: Fetch, offset: int, length: int, limit: int) -> Iterator[Listed]:
     """The INDX chunk at an offset, then the one that it continues, and so on; FormatError."""
-    due: PreviousIndex | None = None
+    expected: PreviousIndex | None = None
     for _ in range(MOST_INDEXES):
-        listed = parse_index(fetch(offset, length), offset, limit)
-        if due not in (None, listed.chunk):  # INDX-06
+        index = parse_index(fetch(offset, length), offset, limit)
+        if expected not in (None, index.chunk):  # INDX-06
             raise FormatError(f"INDX at {offset} differs from the one that the next INDX continues")
-        yield listed
-        if (due := listed.previous) is None:
+        yield index
+        if (expected := index.previous) is None:
             return
-        offset, length = due.offset, due.length
+        offset, length = expected.offset, expected.length
     raise FormatError(f"more than {MOST_INDEXES} INDX chunks are chained")  # INDX-07
 
 
@@ -116,16 +116,16 @@ def directory_of(indexes: Iterable[Listed]) -> Directory:
     each = list(indexes)[::-1]
     directory = Directory(head=each[-1].index.head)
     clips = _Clips()
-    for listed in each:
-        if listed.index.head != directory.head:
+    for index in each:
+        if index.index.head != directory.head:
             raise FormatError("two INDX differ in their copies of HEAD")
-        _add_shared(directory, listed)
-        _add_attachments(directory, listed)
-        for row in listed.index.aliases:
+        _add_shared(directory, index)
+        _add_attachments(directory, index)
+        for row in index.index.aliases:
             _add(directory.aliases, row.name, (row.of, row.target))
-        clips.add(ClipTables(listed))
+        clips.add(ClipTables(index))
         directory.clips = ClipRows(clips.names, clips.row, clips.having, clips.places)
-        directory.indexes += (place_of(listed.chunk, listed.n_bytes, directory),)
+        directory.indexes += (place_of(index.chunk, index.n_bytes, directory),)
     if len(directory.clips) < len(clips.names):
         raise FormatError("INDX: two clips have the same name")
     return directory
@@ -143,18 +143,18 @@ def place_of(chunk: PreviousIndex, n_bytes: int, directory: Directory) -> IndexP
     )
 
 
-def _add_shared(directory: Directory, listed: Listed) -> None:
-    table = listed.index.shared
+def _add_shared(directory: Directory, index: Listed) -> None:
+    table = index.index.shared
     for kind, id_, chunk in zip(
-        table.blobs("type"), table.blobs("id"), _chunks_of(table, listed.start), strict=True
+        table.blobs("type"), table.blobs("id"), _chunks_of(table, index.start), strict=True
     ):
         if (kind, id_) in directory.shared:
             raise FormatError(f"INDX: two {kind.decode()} entries have the id {id_.hex()}")
         directory.shared[kind, id_] = Chunk(kind, 0, chunk.offset, chunk.length)
 
 
-def _add_attachments(directory: Directory, listed: Listed) -> None:
-    table, chunks = listed.index.attachments, _chunks_of(listed.index.parts, listed.start)
+def _add_attachments(directory: Directory, index: Listed) -> None:
+    table, chunks = index.index.attachments, _chunks_of(index.index.parts, index.start)
     bounds = _bounds(table.numbers("n_parts"), len(chunks), "parts").tolist()
     for row, first, stop in zip(table, bounds[:-1], bounds[1:], strict=True):
         _add(directory.attachments, row.name, AttachmentRow(row.name, row.size, chunks[first:stop]))
@@ -166,10 +166,10 @@ def _add(table: dict[str, T], name: str, row: T) -> None:
     table[name] = row
 
 
-def _bounds(counts: Numbers, total: int, what: str) -> Numbers:
+def _bounds(counts: Numbers, total: int, label: str) -> Numbers:
     """The first item of each in a table of ``total`` items, and the end of the last ones."""
     if counts.sum(dtype=np.float64) != total:  # INDX-08
-        raise FormatError(f"INDX: the number of {what} differs from the sum of their counts")
+        raise FormatError(f"INDX: the number of {label} differs from the sum of their counts")
     return np.concatenate(([0], np.cumsum(counts)))
 
 
@@ -358,26 +358,26 @@ class IndexCheck:
             since, depth = before[0][0], before[0][1] + 1
         if depth > MOST_INDEXES:  # INDX-07
             raise FormatError(f"it continues a chain of {depth - 1} others", where=where)
-        due = index_record(directory, since)
-        expected = build(due, where)
+        rebuilt = index_record(directory, since)
+        expected = build(rebuilt, where)
         if content[: len(expected)] != expected:  # INDX-04, INDX-05, INDX-08
-            raise FormatError(_first_difference(parse(Index, content, where), due), where=where)
+            raise FormatError(_first_difference(parse(Index, content, where), rebuilt), where=where)
         name = index_name(build_chunk(chunk.type, payload, chunk.flags), chunk.offset)
         self._found.append((place_of(name, outer.size, directory), depth))
 
 
-def _first_difference(listed: Index, due: Index) -> str:
-    for name, given in vars(listed).items():
-        expected = getattr(due, name)
-        if name == "extension" or given == expected:
+def _first_difference(index: Index, rebuilt: Index) -> str:
+    for name, values in vars(index).items():
+        expected = getattr(rebuilt, name)
+        if name == "extension" or values == expected:
             continue
         if name == "head":
             return "its copy of HEAD differs from HEAD"
-        if not isinstance(given, Table):
-            return f"{name} is {given!r}, the file has {expected!r}"
-        if len(given) != len(expected):
-            return f"it lists {len(given)} {name}, there are {len(expected)}"
-        for row, (one, other) in enumerate(zip(given, expected, strict=True)):
+        if not isinstance(values, Table):
+            return f"{name} is {values!r}, the file has {expected!r}"
+        if len(values) != len(expected):
+            return f"it lists {len(values)} {name}, there are {len(expected)}"
+        for row, (one, other) in enumerate(zip(values, expected, strict=True)):
             for field, value in vars(one).items():
                 if value != getattr(other, field):
                     return (

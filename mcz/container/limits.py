@@ -82,16 +82,16 @@ def profile_named(name: str) -> Profile:
     raise OptionError(f"profile {name!r} is not small, base or large", value=name)
 
 
-def check(what: str, value: int, limit: int) -> None:
+def check(noun: str, value: int, limit: int) -> None:
     if value > limit:  # LIMIT-02
-        raise LimitError(f"{what}: {value} is over the limit of {limit}", value=value)
+        raise LimitError(f"{noun}: {value} is over the limit of {limit}", value=value)
 
 
-def check_decoded(what: str, value: int, limit: int) -> None:
+def check_decoded(noun: str, value: int, limit: int) -> None:
     """Raise LimitError if ``value`` bytes exceed the limit that the caller sets for a file."""
     if value > limit:  # LIMIT-02
         raise LimitError(
-            f"{what}: {value} bytes are over the limit of {limit} decoded bytes",
+            f"{noun}: {value} bytes are over the limit of {limit} decoded bytes",
             value=value,
             hint=Hint.MAX_DECODED,
         )

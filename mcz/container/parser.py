@@ -129,8 +129,8 @@ class Parser:
 
     def feed(self, data: bytes) -> None:
         """Append the bytes requested by ``wants``, or more of them."""
-        used = min(max(0, self.at - self._start), len(self._data))
-        self._start, self._data = self._start + used, self._data[used:] + data
+        n_used = min(max(0, self.at - self._start), len(self._data))
+        self._start, self._data = self._start + n_used, self._data[n_used:] + data
 
     def end(self) -> None:
         """Note that the stream ends after the bytes that were fed."""
@@ -220,16 +220,16 @@ class Parser:
         if rows.get(self.state) in (BODY, CLIP):
             self.state = rows[self.state]
 
-    def _position(self, start: int, stop: int, what: str = "a packet") -> int:
+    def _position(self, start: int, stop: int, noun: str = "a packet") -> int:
         """The place of the byte at ``start`` in the buffer, which has all up to ``stop``."""
         if stop > self._start + len(self._data):
             if self.size is not None and stop > self.size:
-                raise TruncatedError(f"{self._name} ends at {self.size}, in {what} at {self.at}")
+                raise TruncatedError(f"{self._name} ends at {self.size}, in {noun} at {self.at}")
             raise Short(stop)
         return start - self._start
 
-    def _bytes(self, start: int, stop: int, what: str = "a packet") -> bytes:
-        pos = self._position(start, stop, what)
+    def _bytes(self, start: int, stop: int, label: str = "a packet") -> bytes:
+        pos = self._position(start, stop, label)
         return self._data[pos : pos + stop - start]
 
     def _read_next(self) -> Event | None:
@@ -279,7 +279,7 @@ class Parser:
         """The chunk, checked as far as it is read."""
         assert chunk.length is not None
         at, end = chunk.offset, chunk.offset + chunk.size
-        kept = (
+        payload = (
             chunk.size
             if most_bytes == WHOLE
             else HEADER.size + min(max(0, most_bytes), chunk.length)
@@ -291,17 +291,17 @@ class Parser:
                 raise LimitError(
                     f"chunk {chunk.label}: {chunk.length} bytes are over the limit of {limit}"
                 )
-            if chunk.size > max(BLOCK, kept) and not self._is_lost:
-                return self._continue_large(ChunkEvent(chunk, self._bytes(at, at + kept), ""), 0)
+            if chunk.size > max(BLOCK, payload) and not self._is_lost:
+                return self._continue_large(ChunkEvent(chunk, self._bytes(at, at + payload), ""), 0)
             data = self._bytes(at, end)
             try:
                 check_crc(chunk, zlib.crc32(memoryview(data)[: -CRC.size]), data[-CRC.size :])
             except ChecksumError:
                 self._pass(chunk)
                 raise
-            data = data[:kept]
+            data = data[:payload]
         else:
-            data = self._bytes(at, at + kept)
+            data = self._bytes(at, at + payload)
         self._go_to(end)
         return self._place(ChunkEvent(chunk, data, thing_of(chunk)))
 
@@ -365,8 +365,8 @@ class Parser:
             implied = implied_by(self._due() + skipped, self._mask())
         # INDX-03, PACK-04, PACK-15
         if packet_check(data[pos:start], body, implied) != data[stop:end]:
-            due = f", or it is not frame {self._number + skipped}" if implied else ""
-            raise ChecksumError(f"crc of packet {sequence} is wrong{due}")
+            hint = f", or it is not frame {self._number + skipped}" if implied else ""
+            raise ChecksumError(f"crc of packet {sequence} is wrong{hint}")
         self._skip(skipped)
         packet = Packet(kind, sequence, body, first >= FRESH_PACKET, implied)
         assert self._chunk is not None

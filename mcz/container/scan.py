@@ -201,8 +201,8 @@ class Salvager(Scanner):
         self._check_owner("DATA", row.offset, row.size)
         super()._segment(row)
 
-    def _may_follow(self, first: int, due: int) -> bool:
-        return first >= due
+    def _may_follow(self, first: int, frame: int) -> bool:
+        return first >= frame
 
     def _end_clip(self, chunk: Chunk, payload: bytes) -> None:
         self._check_owner("CEND", chunk.offset, chunk.size)

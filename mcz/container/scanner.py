@@ -35,8 +35,8 @@ def is_plain_path(name: str) -> bool:
     """Return True for a relative path that stays below its folder on every system."""
     parts = name.split("/")
     # PATH-01, PATH-02, PATH-03, PATH-04
-    odd = any(part in ("", ".", "..") for part in parts) or "\\" in name or "\0" in name
-    return not (odd or PurePosixPath(name).is_absolute() or ":" in parts[0])  # PATH-05
+    is_odd = any(part in ("", ".", "..") for part in parts) or "\\" in name or "\0" in name
+    return not (is_odd or PurePosixPath(name).is_absolute() or ":" in parts[0])  # PATH-05
 
 
 def check_path(name: str, where: str) -> None:
@@ -361,16 +361,16 @@ class Scanner:
             raise LimitError(f"DATA at {at}: profile small does not allow group notes")
         if header.signal >= len(self.first):
             raise FormatError(f"DATA at {at}: signal {header.signal} does not exist")  # DATA-06
-        due = self.first[header.signal]
-        if not self._may_follow(header.first, due):  # DATA-08
+        frame = self.first[header.signal]
+        if not self._may_follow(header.first, frame):  # DATA-08
             raise FormatError(
-                f"DATA at {at}: the segment begins at frame {header.first}; expected {due}"
+                f"DATA at {at}: the segment begins at frame {header.first}; expected {frame}"
             )
         self.first[header.signal] = header.stop  # DATA-08
         self.clip.segments.append(row)
 
-    def _may_follow(self, first: int, due: int) -> bool:
-        return first == due
+    def _may_follow(self, first: int, frame: int) -> bool:
+        return first == frame
 
     def _end_clip(self, chunk: Chunk, payload: bytes) -> None:
         assert self.clip is not None
@@ -386,9 +386,11 @@ class Scanner:
         self.result.directory.clips[clip.name] = clip
         stored = [row.stored(clip.n_frames) for row in clip.signals]
         return [
-            FormatError(f"clip {clip.name!r}: signal {signal} has {frames} frames; expected {due}")
-            for signal, (frames, due) in enumerate(zip(self.first, stored, strict=True))
-            if frames != due
+            FormatError(
+                f"clip {clip.name!r}: signal {signal} has {frames} frames; expected {n_frames}"
+            )
+            for signal, (frames, n_frames) in enumerate(zip(self.first, stored, strict=True))
+            if frames != n_frames
         ]
 
     def _index(self, chunk: Chunk, payload: bytes) -> None:

@@ -55,10 +55,10 @@ def locked_file(path: Path) -> Iterator[BinaryIO]:
 
 def is_locked(stream: BinaryIO) -> bool:
     """Return True if another process has locked the file of ``stream``."""
-    taken = _take(stream)
-    if taken:
+    is_free = _take(stream)
+    if is_free:
         _release(stream)
-    return taken is False
+    return is_free is False
 
 
 def is_abandoned(stream: BinaryIO) -> bool:

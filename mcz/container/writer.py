@@ -326,13 +326,13 @@ class Writer:
         if self._copies is not None:
             self._copies = [copy for copy in self._copies if copy.offset < offset]
 
-    def _between_clips(self, what: str) -> None:
+    def _between_clips(self, chunk: str) -> None:
         if self._clip is not None:
-            raise FormatError(f"{what} inside the clip {self._clip.name!r}")
+            raise FormatError(f"{chunk} inside the clip {self._clip.name!r}")
 
-    def _in_clip(self, what: str) -> ClipRow:
+    def _in_clip(self, chunk: str) -> ClipRow:
         if self._clip is None:
-            raise FormatError(f"{what} outside a clip")
+            raise FormatError(f"{chunk} outside a clip")
         return self._clip
 
     def _new_name(self, name: str, table: Params) -> None:

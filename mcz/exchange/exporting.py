@@ -82,10 +82,10 @@ class _Column(NamedTuple):
 
 def recording_of(motion: Motion) -> BidsRecording:
     """The place of a clip: that of its name if BIDS made it, else one of subject and name."""
-    named = _NAME.fullmatch(PurePosixPath(motion.name).name)
-    if named is not None:
-        subject, session, task = named[1], named[3] or "", named[4]
-        return BidsRecording(subject, session, task, named[0].removesuffix("_motion"))
+    match = _NAME.fullmatch(PurePosixPath(motion.name).name)
+    if match is not None:
+        subject, session, task = match[1], match[3] or "", match[4]
+        return BidsRecording(subject, session, task, match[0].removesuffix("_motion"))
     subject = _label(motion.metadata.get("subject", "")) or UNKNOWN
     task = _label(motion.name) or UNKNOWN
     is_inertial = motion.source is not None and motion.source.format == "mvnx"

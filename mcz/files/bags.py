@@ -62,8 +62,8 @@ def read_manifest(text: str) -> Iterator[tuple[str, str]]:
 def is_inside(path: str) -> bool:
     """Return True if a path of a manifest stays in the bag on every system."""
     pure = PurePosixPath(path)
-    odd = pure.is_absolute() or ".." in pure.parts or "\\" in path or "\0" in path
-    return bool(pure.parts) and not odd and ":" not in pure.parts[0] and pure.parts[0] != "~"
+    is_odd = pure.is_absolute() or ".." in pure.parts or "\\" in path or "\0" in path
+    return bool(pure.parts) and not is_odd and ":" not in pure.parts[0] and pure.parts[0] != "~"
 
 
 def tags_text(pairs: Pairs) -> str:
@@ -315,9 +315,9 @@ def bag(
 def _info_lines(info: dict[str, str], software: str) -> list[tuple[str, str]]:
     if any(name.lower() == OXUM.lower() for name in info):
         raise OptionError(f"{OXUM} is computed, so it cannot be set")
-    given = {name.lower() for name in info}
+    present = {name.lower() for name in info}
     ours = {"Bagging-Date": date.today().isoformat(), "Bag-Software-Agent": software}
-    lines = [*info.items(), *(pair for pair in ours.items() if pair[0].lower() not in given)]
+    lines = [*info.items(), *(pair for pair in ours.items() if pair[0].lower() not in present)]
     tags_text(lines)  # raises before any work
     return lines
 
@@ -364,11 +364,11 @@ def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> 
         INFO: tags_text([*lines, (OXUM, f"{size}.{len(paths)}")]),
     }
     tags |= {f"manifest-{name}.txt": manifest_text(rows) for name, rows in by_algorithm.items()}
-    stated: dict[str, dict[str, str]] = {name: {} for name in ALGORITHMS}
+    manifests: dict[str, dict[str, str]] = {name: {} for name in ALGORITHMS}
     for name, text in tags.items():
         _write(folder / name, text)
-        _add_digests(stated, name, folder / name)
-    for name, rows in stated.items():
+        _add_digests(manifests, name, folder / name)
+    for name, rows in manifests.items():
         _write(folder / f"tagmanifest-{name}.txt", manifest_text(rows))
 
 

@@ -248,7 +248,7 @@ def pack(
     """
     root = os.fspath(root)
     files, others = list_files(root, target)
-    taken, left = _chosen(files, keep_all)
+    names, left = _chosen(files, keep_all)
     options = SourceOptions(
         rate=rate,
         force_rate=force_rate,
@@ -260,22 +260,22 @@ def pack(
         flat=True,
     )
     encoding = encoding_options(codec, effort, params)
-    paths = [os.path.join(root, one.name) for one in taken] if "://" not in root else []  # noqa: PTH118
+    paths = [os.path.join(root, one.name) for one in names] if "://" not in root else []  # noqa: PTH118
     inputs = (*paths, *encoding.params.values())
     report, limits = Report(), profile_named(profile)
     skeletons = [one.name for one in files if one.name.lower().endswith(".asf")]
-    entries = [SourceEncoder(Path(root, one.name), one.name, options, encoding) for one in taken]
+    entries = [SourceEncoder(Path(root, one.name), one.name, options, encoding) for one in names]
     asks = (RemoteFile(root, entry, skeletons_beside(entry.name, skeletons)) for entry in entries)
     with connect(client) as used, replacing(target, force=force, inputs=inputs) as stream:
         transaction = WriteTransaction(stream, limits, copies=copies)
         with closing(Cluster(used).in_order(encode_remotely, asks, limits)) as answers:
-            given = cast(Iterator[Answer[Part]], answers)  # no item is None
-            made = zip(entries, given, taken, strict=True)
+            results = cast(Iterator[Answer[Part]], answers)  # no item is None
+            made = zip(entries, results, names, strict=True)
             parts = (RemotePart(entry, answer, one.size) for entry, answer, one in made)
-            write_in_turn(transaction, parts, len(taken), report, progress, {})
+            write_in_turn(transaction, parts, len(names), report, progress, {})
         transaction.finish()
     report.size = transaction.writer.offset
-    report.add_messages(notes_on(one.name for one in taken))
+    report.add_messages(notes_on(one.name for one in names))
     report.outcomes += sorted([*others, *left], key=lambda one: os.fsencode(one.path))
     return report
 

@@ -115,11 +115,11 @@ class _Parser:
         self.at += is_next
         return is_next
 
-    def expected(self, what: str) -> OptionError:
+    def expected(self, noun: str) -> OptionError:
         """The error for another token here."""
         word = self.token.raw.lower()
         hint = f"; write {word}" if self.token.kind == "name" and word in WORDS else ""
-        return fault(self.text, self.token.at, f"expected {what}, not {self.token}{hint}")
+        return fault(self.text, self.token.at, f"expected {noun}, not {self.token}{hint}")
 
     def query(self) -> Node:
         if self.token.kind == "end":
@@ -179,8 +179,8 @@ class _Parser:
         if not is_equality(sign.raw) and (_is_truth(left) or _is_truth(right)):
             raise fault(self.text, sign.at, f"true and false have no order {sign}")
         if self.token.raw in COMPARISONS:
-            what = f"a comparison has two sides: write {self.chain(sign)}"
-            raise fault(self.text, self.token.at, what)
+            problem = f"a comparison has two sides: write {self.chain(sign)}"
+            raise fault(self.text, self.token.at, problem)
         return Compare(left, sign.raw, right)
 
     def chain(self, sign: Token) -> str:
@@ -203,12 +203,12 @@ class _Parser:
             return Name(self.next().raw)
         return self.literal("a name, a number or a text in quotes")
 
-    def literal(self, what: str) -> Literal:
+    def literal(self, label: str) -> Literal:
         if self.token.kind in ("text", "number"):
             return Literal(self.next().value)
         if self.token.raw in ("true", "false"):
             return Literal(self.next().raw == "true")
-        raise self.expected(what)
+        raise self.expected(label)
 
     def list(self) -> tuple[Literal, ...]:
         closing = CLOSING.get(self.token.raw)
@@ -271,13 +271,13 @@ class Token:
         return "the end" if self.kind == "end" else quote_name(self.raw)
 
 
-def fault(text: str, at: int, what: str) -> OptionError:
-    """The error ``what`` at an offset of a query; it shows the column and the text around it."""
+def fault(text: str, at: int, problem: str) -> OptionError:
+    """The error ``problem`` at an offset of a query; it shows the column and the text around it."""
     before, after = text[max(at - CONTEXT, 0) : at], text[at : at + CONTEXT]
     left = "..." if at > CONTEXT else ""
     right = "..." if at + CONTEXT < len(text) else ""
     place = f"{left}{before}".strip() + " --> " + f"{after}{right}"
-    return OptionError(f"where: column {at + 1}: {what} ({place.strip()})")
+    return OptionError(f"where: column {at + 1}: {problem} ({place.strip()})")
 
 
 def tokens(text: str) -> Iterator[Token]:
@@ -326,6 +326,6 @@ def _unescaped(at: int, raw: str, text: str) -> str:
     r"""Unescape a quoted text: \' \" and \\ are the only escapes."""
     for match in _ESCAPE.finditer(raw):
         if match[1] not in "'\"\\":
-            what = rf"{quote_name(match[0])} is no escape; these are: \' \" \\"
-            raise fault(text, at + match.start(), what)
+            problem = rf"{quote_name(match[0])} is no escape; these are: \' \" \\"
+            raise fault(text, at + match.start(), problem)
     return _ESCAPE.sub(r"\1", raw[1:-1])

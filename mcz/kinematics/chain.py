@@ -207,10 +207,10 @@ class Chain:
         return arm, origin, above if link.change is None else multiply_matrices(above, link.change)
 
     def add(
-        self, pose: Pose, link: Link, hung: tuple[Floats, Floats, Floats], columns: Floats
+        self, pose: Pose, link: Link, placement: tuple[Floats, Floats, Floats], columns: Floats
     ) -> None:
         """Add a joint that ``place_joint`` placed to ``pose``, turned by its channels."""
-        arm, origin, axes = hung
+        arm, origin, axes = placement
         spins: list[Floats] = []
         axes = self.apply_turns(link, axes, columns, spins)
         pose.arms.append(arm)

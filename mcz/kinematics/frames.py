@@ -287,22 +287,22 @@ class ClipLike(Protocol):
 MotionLike = Motion | ClipLike
 
 
-def frame_range(moving: MotionLike, frames: Frames) -> tuple[int, int]:
+def frame_range(motion: MotionLike, frames: Frames) -> tuple[int, int]:
     """Frames a <= f < b, from a pair or a slice; raises OptionError if they are out of range.
 
     A slice counts as numpy's do: ends may be left out, negative or beyond.
     """
     if isinstance(frames, slice):
-        start, stop, step = frames.indices(moving.n_frames)
+        start, stop, step = frames.indices(motion.n_frames)
         if step != 1:
             raise OptionError(
                 f"frames is {frames}, but a step is not supported; take every n-th frame of "
                 "the result"
             )
         return start, max(start, stop)
-    start, stop = frames if frames is not None else (0, moving.n_frames)
-    if not 0 <= start <= stop <= moving.n_frames:
-        raise OptionError(f"{moving.name!r} has {moving.n_frames} frames, not {start}:{stop}")
+    start, stop = frames if frames is not None else (0, motion.n_frames)
+    if not 0 <= start <= stop <= motion.n_frames:
+        raise OptionError(f"{motion.name!r} has {motion.n_frames} frames, not {start}:{stop}")
     return start, stop
 
 
@@ -313,22 +313,22 @@ def joint_numbers(skeleton: Skeleton, joints: Joints) -> list[int]:
     return [skeleton.find(joint) for joint in joint_list(joints)]
 
 
-def values_of(moving: MotionLike, frames: tuple[int, int], joints: Sequence[int]) -> Floats:
+def values_of(motion: MotionLike, frames: tuple[int, int], joints: Sequence[int]) -> Floats:
     """The channels of these joints, float64 (n_frames, n_channels), NaN if invalid.
 
     Columns of other joints are undefined. Raises MotionError if the rows of the motion are not
     poses, see ``check_poses``.
     """
-    skeleton = moving.skeleton
-    check_poses(moving.name, moving.signals[0])
-    if isinstance(moving, Motion):
-        return np.asarray(moving.signals[0].cut(*frames).masked(), np.float64)
+    skeleton = motion.skeleton
+    check_poses(motion.name, motion.signals[0])
+    if isinstance(motion, Motion):
+        return np.asarray(motion.signals[0].cut(*frames).masked(), np.float64)
     columns = joint_columns(skeleton, joints)
     if len(columns) == skeleton.n_channels:
-        return np.asarray(moving.read(frames), np.float64)
+        return np.asarray(motion.read(frames), np.float64)
     values = np.zeros((frames[1] - frames[0], skeleton.n_channels))
     if columns:
-        values[:, columns] = moving.read(frames, joints=joints)
+        values[:, columns] = motion.read(frames, joints=joints)
     return values
 
 
@@ -348,7 +348,7 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     return skeleton.unit_cm / unit_cm
 
 
-def times(moving: MotionLike, frames: Frames = None, *, signal: int | str = 0) -> Floats:
+def times(motion: MotionLike, frames: Frames = None, *, signal: int | str = 0) -> Floats:
     """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
 
     Times of a signal of times; else, by frame numbers and rate, from ``first_time`` on or, without
@@ -356,22 +356,22 @@ def times(moving: MotionLike, frames: Frames = None, *, signal: int | str = 0) -
     by index or name: the times of its samples, evenly spaced from each frame on. ``frames`` (a, b)
     or a slice. Raises OptionError if neither times nor a rate are known.
     """
-    start, stop = frame_range(moving, frames)
-    timeline = known_timeline(moving.name, moving.timeline)
-    per_frame = signal_of(moving, signal).samples_per_frame
+    start, stop = frame_range(motion, frames)
+    timeline = known_timeline(motion.name, motion.timeline)
+    per_frame = signal_of(motion, signal).samples_per_frame
     return timeline.samples(per_frame)[start * per_frame : stop * per_frame]
 
 
-def signal_of(moving: MotionLike, signal: int | str) -> Any:
+def signal_of(motion: MotionLike, signal: int | str) -> Any:
     """A signal by index or name, the first of its name; raises OptionError."""
-    names = [each.name for each in moving.signals]
+    names = [each.name for each in motion.signals]
     if isinstance(signal, str) and signal in names:
-        return moving.signals[names.index(signal)]
+        return motion.signals[names.index(signal)]
     if isinstance(signal, str) or not 0 <= signal < len(names):
         raise OptionError(
-            f"{moving.name!r} has no signal {signal!r}; its signals are {', '.join(names)}"
+            f"{motion.name!r} has no signal {signal!r}; its signals are {', '.join(names)}"
         )
-    return moving.signals[signal]
+    return motion.signals[signal]
 
 
 def as_type(values: Reals, dtype: DTypeLike) -> Reals:

@@ -54,22 +54,22 @@ def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) 
     OptionError for virtual markers without a length unit.
     """
     targets = Targets(skeleton, markers=markers is not None)
-    seen, known = _targets_seen(targets, points, markers)
-    if not seen.shape[2]:
+    goals, known = _goals(targets, points, markers)
+    if not goals.shape[2]:
         return np.zeros((0, skeleton.n_channels))
-    return _Solution(targets, seen, known).values()
+    return _Solution(targets, goals, known).values()
 
 
 class _Solution:
     """The state of the solver: values (n_channels, F) and their errors (F,)."""
 
-    def __init__(self, targets: Targets, seen: Floats, known: Floats) -> None:
-        self.targets, self.seen, self.known = targets, seen, known
+    def __init__(self, targets: Targets, points: Floats, known: Floats) -> None:
+        self.targets, self.points, self.known = targets, points, known
         links = targets.chain.links
         self.angles = np.array([c for link in links for c in link.angles], np.int64)
         self.vectors = np.array([c for link in links for c in link.vector], np.int64)
         self.columns = self._initial_columns()
-        self.errors = np.zeros(seen.shape[2])
+        self.errors = np.zeros(points.shape[2])
 
     def values(self) -> Floats:
         """Run all steps; returns values (n_frames, n_channels)."""
@@ -85,19 +85,19 @@ class _Solution:
         return np.ascontiguousarray(self.columns.T)
 
     def _initial_columns(self) -> Floats:
-        guess, n_frames = InitialPose(self.targets), self.seen.shape[2]
+        guess, n_frames = InitialPose(self.targets), self.points.shape[2]
         parts = [slice(start, start + GUESS_BLOCK) for start in range(0, n_frames, GUESS_BLOCK)]
         return np.concatenate(
-            [guess.columns(self.seen[:, :, rows], self.known[:, rows]) for rows in parts], axis=1
+            [guess.columns(self.points[:, :, rows], self.known[:, rows]) for rows in parts], axis=1
         )
 
     def _refine(
         self, start: Floats, prior: Floats, weight: Floats, steps: int, frames: Ints | None = None
     ) -> tuple[Floats, Floats]:
-        seen, known = self.seen, self.known
+        points, known = self.points, self.known
         if frames is not None:
-            seen, known = seen[:, :, frames], known[:, frames]
-        return refine(self.targets, start, seen, known, prior, weight, steps)
+            points, known = points[:, :, frames], known[:, frames]
+        return refine(self.targets, start, points, known, prior, weight, steps)
 
     def _accept(
         self, solution: tuple[Floats, Floats], limit: Floats | None, frames: Any = slice(None)
@@ -204,9 +204,7 @@ def _between(jumps: Ints, n_frames: int) -> Bools:
     return between
 
 
-def _targets_seen(
-    targets: Targets, points: Floats, markers: Floats | None
-) -> tuple[Floats, Floats]:
+def _goals(targets: Targets, points: Floats, markers: Floats | None) -> tuple[Floats, Floats]:
     """(positions (n_targets, 3, F), 0 if unknown; 1.0 if known, else 0.0, (n_targets, F))."""
     skeleton = targets.skeleton
     n_markers = 0 if markers is None else 3 * skeleton.n_joints
@@ -220,10 +218,10 @@ def _targets_seen(
     if markers is not None and len(markers) != len(points):
         raise MotionError(f"{len(points)} frames of points, but {len(markers)} of virtual markers")
     positions = points if markers is None else np.concatenate([points, markers], axis=1)
-    seen = np.array(np.moveaxis(positions, 0, 2), np.float64, order="C")
-    finite: Bools = np.isfinite(seen)
+    goals = np.array(np.moveaxis(positions, 0, 2), np.float64, order="C")
+    finite: Bools = np.isfinite(goals)
     known = np.logical_and.reduce(finite, axis=1)
-    return np.where(known[:, None], seen, 0.0), known.astype(np.float64)
+    return np.where(known[:, None], goals, 0.0), known.astype(np.float64)
 
 
 def _means(tracks: Floats, around: int) -> Floats:
@@ -248,7 +246,7 @@ DIAGONAL_FLOOR = 1e-12  # added to the diagonal, so the matrix is regular
 def refine(
     targets: Targets,
     columns: Floats,
-    seen: Floats,
+    points: Floats,
     known: Floats,
     prior: Floats,
     weight: Floats,
@@ -256,7 +254,7 @@ def refine(
 ) -> tuple[Floats, Floats]:
     """Minimize the squared distances; return values (n_channels, F) and sums of squares, (F,).
 
-    The objective is the sum over targets of |position - seen|^2 where ``known`` is 1, plus
+    The objective is the sum over targets of |position - point|^2 where ``known`` is 1, plus
     ``weight``, (n_channels, 1), times the squares of the steps, in ``targets.units``, from
     ``prior``.
     """
@@ -265,7 +263,7 @@ def refine(
     step = max(1, BLOCK_NUMBERS // per_frame)
     for start in range(0, columns.shape[1], step):
         rows = slice(start, start + step)
-        part = _Descent(targets, seen[:, :, rows], known[:, rows], prior[:, rows], weight)
+        part = _Descent(targets, points[:, :, rows], known[:, rows], prior[:, rows], weight)
         result[:, rows], errors[rows] = part.run(columns[:, rows], most_steps)
     return result, errors
 
@@ -274,10 +272,10 @@ class _Descent:
     """Damped Gauss-Newton over a block of frames."""
 
     def __init__(
-        self, targets: Targets, seen: Floats, known: Floats, prior: Floats, weight: Floats
+        self, targets: Targets, points: Floats, known: Floats, prior: Floats, weight: Floats
     ) -> None:
         self.targets, self.known, self.prior, self.weight = targets, known, prior, weight
-        self.seen = np.where(known[:, None] > 0, seen, 0.0)
+        self.points = np.where(known[:, None] > 0, points, 0.0)
         self.free = np.flatnonzero(targets.units)
         self.units = targets.units[self.free, None]
 
@@ -310,7 +308,7 @@ class _Descent:
         """Objective of each frame, and the targets' share of it, (F,) each."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             positions = self.targets.positions(columns, self.targets.chain.pose(columns))
-            missed = (positions - self.seen[:, :, frames]) * self.known[:, None, frames]
+            missed = (positions - self.points[:, :, frames]) * self.known[:, None, frames]
             errors = (missed * missed).sum(axis=(0, 1))
         away = self._steps_from_prior(columns, frames)
         costs = errors + (self.weight[self.free] * away * away).sum(axis=0)
@@ -328,7 +326,7 @@ class _Descent:
             positions = targets.positions(columns, pose)
             known = self.known[:, None, frames]
             slopes = targets.jacobian(columns, pose, positions)[self.free] * known
-            missed = (self.seen[:, :, frames] - positions) * known
+            missed = (self.points[:, :, frames] - positions) * known
         n_frames = len(frames)
         matrix = np.ascontiguousarray(
             slopes.reshape(len(self.free), -1, n_frames).transpose(2, 0, 1)

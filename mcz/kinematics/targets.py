@@ -280,27 +280,27 @@ class InitialPose:
             and tails[target.tail] == bone.offset
         ]
 
-    def columns(self, seen: Floats, known: Floats) -> Floats:
+    def columns(self, targets: Floats, known: Floats) -> Floats:
         """Values (n_channels, F) for positions seen, (n_targets, 3, F), where ``known`` is 1.
 
         A joint without a known target keeps the angles of the frame before.
         """
-        columns = self.targets.neutral(seen.shape[2])
+        columns = self.targets.neutral(targets.shape[2])
         pose = Pose([], [], [], [])
         for joint, link in enumerate(self.chain.links):
-            hung = self.chain.place_joint(pose, link, columns)
+            placement = self.chain.place_joint(pose, link, columns)
             if link.turns or link.moves:
-                self._fit(joint, link, hung, seen, known, columns)
-                hung = self._move_joint(joint, link, hung, seen, known, columns, pose)
-            self.chain.add(pose, link, hung, columns)
+                self._fit(joint, link, placement, targets, known, columns)
+                placement = self._move_joint(joint, link, placement, targets, known, columns, pose)
+            self.chain.add(pose, link, placement, columns)
         return columns
 
     def _fit(
         self,
         joint: int,
         link: Link,
-        hung: tuple[Floats, Floats, Floats],
-        seen: Floats,
+        placement: tuple[Floats, Floats, Floats],
+        targets: Floats,
         known: Floats,
         columns: Floats,
     ) -> None:
@@ -309,8 +309,8 @@ class InitialPose:
         if not link.turns or not len(body.numbers):
             return
         weights = known[body.numbers] * body.weights[:, None]
-        moment = self._moment(joint, link, hung[1], seen, known, weights)
-        axes = np.broadcast_to(hung[2], (3, 3, columns.shape[1]))
+        moment = self._moment(joint, link, placement[1], targets, known, weights)
+        axes = np.broadcast_to(placement[2], (3, 3, columns.shape[1]))
         local = multiply_matrices(np.swapaxes(axes, 0, 1), moment)
         size = np.sqrt((local * local).sum(axis=(0, 1)))
         local = local + np.eye(3)[:, :, None] * (body.to_rest * size + (size == 0))
@@ -318,15 +318,21 @@ class InitialPose:
         _fill_gaps(link, size > 0, columns)
 
     def _moment(
-        self, joint: int, link: Link, origin: Floats, seen: Floats, known: Floats, weights: Floats
+        self,
+        joint: int,
+        link: Link,
+        origin: Floats,
+        targets: Floats,
+        known: Floats,
+        weights: Floats,
     ) -> Floats:
         """Sum of w b a', (3, 3, F): b as seen and a at rest, from the origin or from the mean."""
         body = self.fastened[joint]
         a = np.broadcast_to(body.positions[:, :, None], (*body.positions.shape, weights.shape[1]))
-        b = seen[body.numbers]
+        b = targets[body.numbers]
         if body.origin >= 0:
             own = known[body.origin] > 0
-            base = np.where(own, seen[body.origin], origin)
+            base = np.where(own, targets[body.origin], origin)
         elif link.moves:  # at any position
             total = np.maximum(weights.sum(axis=0), 1e-300)
             a = a - (weights[:, None] * a).sum(axis=0) / total
@@ -341,8 +347,8 @@ class InitialPose:
         self,
         joint: int,
         link: Link,
-        hung: tuple[Floats, Floats, Floats],
-        seen: Floats,
+        placement: tuple[Floats, Floats, Floats],
+        targets: Floats,
         known: Floats,
         columns: Floats,
         pose: Pose,
@@ -350,20 +356,20 @@ class InitialPose:
         """Set the joint's position channels to where it was seen; return its placement."""
         body = self.fastened[joint]
         if not link.moves:
-            return hung
+            return placement
         if body.origin >= 0:
-            there, origin = known[body.origin] > 0, seen[body.origin]
+            is_known, origin = known[body.origin] > 0, targets[body.origin]
         elif body.numbers:
             trial = Pose(list(pose.origins), list(pose.axes), list(pose.arms), list(pose.spins))
-            self.chain.add(trial, link, hung, columns)
+            self.chain.add(trial, link, placement, columns)
             arms = np.einsum("ijf,nj->nif", trial.axes[-1], body.positions)
             weights = known[body.numbers] * body.weights[:, None]
-            total, there = weights.sum(axis=0), weights.sum(axis=0) > 0
-            steps = weights[:, None] * (seen[body.numbers] - arms)
-            origin = steps.sum(axis=0) / np.where(there, total, 1.0)
+            total, is_known = weights.sum(axis=0), weights.sum(axis=0) > 0
+            steps = weights[:, None] * (targets[body.numbers] - arms)
+            origin = steps.sum(axis=0) / np.where(is_known, total, 1.0)
         else:
-            return hung
-        step = origin - hung[1]
+            return placement
+        step = origin - placement[1]
         if link.parent >= 0:
             step = (np.swapaxes(pose.axes[link.parent], 0, 1) * step[None]).sum(axis=1)
             if link.parent_back is not None:
@@ -371,8 +377,8 @@ class InitialPose:
         done: set[int] = set()
         for component, column in link.moves:
             if component not in done:
-                columns[column] = np.where(there, step[component], 0.0)
-                _interpolate_unknown(columns[column], there)
+                columns[column] = np.where(is_known, step[component], 0.0)
+                _interpolate_unknown(columns[column], is_known)
             done.add(component)
         return self.chain.place_joint(pose, link, columns)
 

@@ -107,8 +107,8 @@ class Timeline:
         """Return whether the times equal those of ``other``, up to the rounding of ``other``."""
         if len(self.times) != len(other.times):
             return False
-        off = np.abs(self.times - other.regular_times).max(initial=0.0)
-        return bool(off <= other.rounding + TOLERANCE)
+        error = np.abs(self.times - other.regular_times).max(initial=0.0)
+        return bool(error <= other.rounding + TOLERANCE)
 
     def samples(self, per_frame: int) -> Floats:
         """The times of ``per_frame`` samples a frame, evenly from each frame on; NaN if unknown."""

@@ -37,7 +37,7 @@ SIDES = {
 
 
 def to_rerun(
-    moving: MotionLike, recording: RecordingStream | None = None, *, entity: str | None = None
+    motion: MotionLike, recording: RecordingStream | None = None, *, entity: str | None = None
 ) -> RecordingStream:
     """Log a Motion or Clip to a ``rerun.RecordingStream``; needs rerun-sdk (``mcz[rerun]``).
 
@@ -55,20 +55,20 @@ def to_rerun(
     rerun = import_extra("rerun", "rerun")
     if recording is None:
         recording = rerun.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
-    _Log(rerun, recording, moving, moving.name if entity is None else entity).all()
+    _Log(rerun, recording, motion, motion.name if entity is None else entity).all()
     return recording
 
 
-def view_of(moving: MotionLike, entity: str) -> Horizontal:
+def view_of(motion: MotionLike, entity: str) -> Horizontal:
     """Blueprint of the rerun viewer for ``to_rerun``: a figure, and curves next to it.
 
     Residuals are logged, but not shown: there are as many as points.
     """
     blueprint = import_extra("rerun.blueprint", "rerun")
-    log = _Log(import_extra("rerun", "rerun"), None, moving, entity)
+    log = _Log(import_extra("rerun", "rerun"), None, motion, entity)
     origin = log.path()
     figure = [blueprint.Spatial3DView(origin=origin, name=entity)] if log.figure else []
-    residuals = {each.name for each in moving.signals if each.role == "residuals"}
+    residuals = {each.name for each in motion.signals if each.role == "residuals"}
     curves = [
         blueprint.TimeSeriesView(origin=log.path(signal), name=f"{entity} {signal}")
         for signal, _, _, _ in log.series
@@ -79,24 +79,24 @@ def view_of(moving: MotionLike, entity: str) -> Horizontal:
 
 
 class _Log:
-    def __init__(self, rerun: ModuleType, recording: Any, moving: MotionLike, entity: str) -> None:
-        self.rerun, self.recording, self.moving = rerun, recording, moving
+    def __init__(self, rerun: ModuleType, recording: Any, motion: MotionLike, entity: str) -> None:
+        self.rerun, self.recording, self.motion = rerun, recording, motion
         self.parts = [part for part in entity.split("/") if part] or ["motion"]
-        self.timeline = moving.timeline
-        self.figure = _figure_of(moving)
-        self.series = list(_series_of(moving))
-        self.numbers = _numbers(moving)
+        self.timeline = motion.timeline
+        self.figure = _figure_of(motion)
+        self.series = list(_series_of(motion))
+        self.numbers = _numbers(motion)
         self.seconds: dict[int, Floats] = {}  # of samples, by how many a frame has
         if self.figure is None and not self.series:
-            raise MotionError("there are neither positions nor scalars to log", clip=moving.name)
+            raise MotionError("there are neither positions nor scalars to log", clip=motion.name)
 
     def all(self) -> None:
         self._still()
         per_frame = sum(len(columns) * rate for _, _, columns, rate in self.series)
         per_frame += 0 if self.figure is None else 3 * self.figure.n_nodes
         step = max(1, BLOCK // max(1, per_frame))
-        for start in range(0, self.moving.n_frames, step):
-            self._frames(start, min(start + step, self.moving.n_frames))
+        for start in range(0, self.motion.n_frames, step):
+            self._frames(start, min(start + step, self.motion.n_frames))
 
     def path(self, *parts: str) -> str:
         return str(self.rerun.new_entity_path([*self.parts, *parts]))
@@ -117,7 +117,7 @@ class _Log:
     def _still(self) -> None:
         """Log constants: axes, names, colors, events."""
         rerun, log = self.rerun, self.recording.log
-        skeleton = self.moving.skeleton
+        skeleton = self.motion.skeleton
         if up := skeleton.up_axis:
             hand = (skeleton.handedness or "right").upper()
             end = "DOWN" if up.startswith("-") else "UP"
@@ -140,8 +140,8 @@ class _Log:
         self._events()
 
     def _events(self) -> None:
-        moving = self.moving
-        recorded = moving.recording if isinstance(moving, Clip) else recording_of(_motion(moving))
+        motion = self.motion
+        recorded = motion.recording if isinstance(motion, Clip) else recording_of(_motion(motion))
         if recorded is None or not recorded.events:
             return
         texts = [" ".join(filter(None, (e.context, e.label))) for e in recorded.events]
@@ -151,9 +151,9 @@ class _Log:
 
     def _frames(self, start: int, stop: int) -> None:
         if self.figure is not None:
-            self._places(start, stop, self.figure.places(self.moving, start, stop))
+            self._places(start, stop, self.figure.places(self.motion, start, stop))
         for signal, index, columns, per_frame in self.series:
-            values = _samples(self.moving, index, start, stop)
+            values = _samples(self.motion, index, start, stop)
             for name, _, column in columns:
                 known = np.isfinite(values[:, column])
                 scalars = self.rerun.Scalars.columns(scalars=values[known, column])
@@ -195,18 +195,18 @@ class _Figure:
         of_bones = self.body.sides[self.body.bones[:, 1]]
         self.bones = {s: self.body.bones[of_bones == s] for s in SIDES if (of_bones == s).any()}
 
-    def places(self, moving: MotionLike, start: int, stop: int) -> Floats:
+    def places(self, motion: MotionLike, start: int, stop: int) -> Floats:
         """Positions of the nodes, (n_frames, n_nodes, 3), NaN where unknown."""
-        values = values_of(moving, (start, stop), range(moving.skeleton.n_joints))
+        values = values_of(motion, (start, stop), range(motion.skeleton.n_joints))
         return self.body.places(values) * self.scale
 
 
-def _figure_of(moving: MotionLike) -> _Figure | None:
-    if not moving.signals[0].has_poses or not moving.skeleton.joints:
+def _figure_of(motion: MotionLike) -> _Figure | None:
+    if not motion.signals[0].has_poses or not motion.skeleton.joints:
         return None
     try:
-        figure = _Figure(moving.skeleton)
-        figure.places(moving, 0, min(1, moving.n_frames))
+        figure = _Figure(motion.skeleton)
+        figure.places(motion, 0, min(1, motion.n_frames))
     except MotionError:
         return None
     return figure
@@ -215,17 +215,17 @@ def _figure_of(moving: MotionLike) -> _Figure | None:
 Columns = list[tuple[str, str, int]]  # names, units, columns
 
 
-def _series_of(moving: MotionLike) -> Iterator[tuple[str, int, Columns, int]]:
+def _series_of(motion: MotionLike) -> Iterator[tuple[str, int, Columns, int]]:
     """Yield name, index, scalar columns and samples per frame of every signal with scalars."""
-    for index, signal in enumerate(moving.signals):
+    for index, signal in enumerate(motion.signals):
         channels = signal.channels
-        kinds = moving.skeleton.channels if channels is None else channels
-        names = channel_names(moving.skeleton, channels)
-        units = channel_units(moving.skeleton, channels)
+        kinds = motion.skeleton.channels if channels is None else channels
+        names = channel_names(motion.skeleton, channels)
+        units = channel_units(motion.skeleton, channels)
         plain = [k for k, channel in enumerate(kinds) if index or not channel.kind]
         per_frame = (
             signal.layout.samples_per_frame
-            if isinstance(moving, Clip)
+            if isinstance(motion, Clip)
             else (signal.samples_per_frame)
         )
         if plain:
@@ -233,18 +233,18 @@ def _series_of(moving: MotionLike) -> Iterator[tuple[str, int, Columns, int]]:
             yield name, index, [(names[k], units[k], k) for k in plain], per_frame
 
 
-def _samples(moving: MotionLike, index: int, start: int, stop: int) -> NDArray[np.float64]:
+def _samples(motion: MotionLike, index: int, start: int, stop: int) -> NDArray[np.float64]:
     """The samples of a signal in some frames, in units, NaN where invalid."""
-    if isinstance(moving, Clip):
-        return np.asarray(moving.read((start, stop), signal=index), np.float64)
-    return np.asarray(_motion(moving).signals[index].cut(start, stop).masked(), np.float64)
+    if isinstance(motion, Clip):
+        return np.asarray(motion.read((start, stop), signal=index), np.float64)
+    return np.asarray(_motion(motion).signals[index].cut(start, stop).masked(), np.float64)
 
 
-def _numbers(moving: MotionLike) -> NDArray[np.int64]:
-    numbers = moving.frame_numbers if isinstance(moving, Clip) else _motion(moving).frame_numbers
-    return numbers_or_rows(numbers, moving.n_frames)
+def _numbers(motion: MotionLike) -> NDArray[np.int64]:
+    numbers = motion.frame_numbers if isinstance(motion, Clip) else _motion(motion).frame_numbers
+    return numbers_or_rows(numbers, motion.n_frames)
 
 
-def _motion(moving: MotionLike) -> Motion:
-    assert isinstance(moving, Motion)
-    return moving
+def _motion(motion: MotionLike) -> Motion:
+    assert isinstance(motion, Motion)
+    return motion

@@ -270,10 +270,10 @@ def build_vectors(rows: Ints, starts: Ints, codes: Codes) -> bytes:
     while True:
         data, coder = np.zeros(size, np.uint8), np.array([0, 1])
         code_vectors(coder, data, rows.copy(), starts, codes.gaps, codes.values)
-        used = -(-int(coder[0]) // 8)
-        if used <= size:
-            return data[:used].tobytes()
-        size = used
+        n_bytes = -(-int(coder[0]) // 8)
+        if n_bytes <= size:
+            return data[:n_bytes].tobytes()
+        size = n_bytes
 
 
 def parse_vectors(

@@ -27,31 +27,31 @@ def bare_state() -> Ints:
     return np.zeros(mixing.SQUASH, np.int64)
 
 
-def encode_stream(start: Ints, size: int, loop: Loop, what: str) -> bytes:
+def encode_stream(start: Ints, size: int, loop: Loop, label: str) -> bytes:
     """The bytes that ``loop`` writes from the state ``start``; about ``size`` are expected."""
     while True:
         data, state = np.zeros(size, np.uint8), start.copy()
         mixing.start(state, data, 1)
         if not loop(state, data):
-            raise AssertionError(f"{what} has no code")
+            raise AssertionError(f"{label} has no code")
         used = mixing.finish(state, data)
         if used <= size:
             return data[:used].tobytes()
         size = used + 256
 
 
-def decode_stream(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: bool) -> None:
+def decode_stream(stream: bytes, start: Ints, loop: Loop, label: str, *, whole: bool) -> None:
     """Run ``loop`` on ``stream``; ``whole``: all its bytes must be needed.
 
-    Raises FormatError, with ``what`` in front, for a bad code or extra bytes.
+    Raises FormatError, with ``label`` in front, for a bad code or extra bytes.
     """
     data = np.frombuffer(stream, np.uint8).copy()  # compiled once: for writable bytes
     state = start.copy()
     mixing.start(state, data, 0)
     if not loop(state, data):
-        raise FormatError(f"{what} is out of range")
+        raise FormatError(f"{label} is out of range")
     if whole and mixing.coded_size(state) != len(data):  # RANGE-04
-        raise FormatError(f"{what}: the stream should not have {len(data)} bytes")
+        raise FormatError(f"{label}: the stream should not have {len(data)} bytes")
 
 
 def scale_of(halves: int) -> int:

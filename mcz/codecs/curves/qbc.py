@@ -147,14 +147,16 @@ def _segment_length(layout: Layout, plan: Plan) -> int:
     return max(delta, min(length, most // delta * delta))
 
 
-def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
+def recode(request: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     """The streams of some joints with new values, with marks and steps of the header."""
-    fields = parse(QbcHeader, asked.header, "qbc header")
-    plan = plan_of_header(fields, asked.options)
-    part = SubsetSource(asked.source, asked.groups, fields.coded_frames)
+    fields = parse(QbcHeader, request.header, "qbc header")
+    plan = plan_of_header(fields, request.options)
+    part = SubsetSource(request.source, request.groups, fields.coded_frames)
     code = _Coder(part, fields.coded_frames, plan)
-    for span in asked.spans:
-        yield code(span.first, span.stop)[: asked.source.layout.n_resolutions * len(asked.groups)]
+    for span in request.spans:
+        yield code(span.first, span.stop)[
+            : request.source.layout.n_resolutions * len(request.groups)
+        ]
 
 
 def preview(header: bytes, layout: Layout, spans: Sequence[Span]) -> Ints:

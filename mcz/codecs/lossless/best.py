@@ -72,10 +72,10 @@ def _prepare(source: SignalSource, start: int, stop: int) -> Callable[[], tuple[
     return lambda: tuple(build_stream(ordinals, grids, layout) for _ in layout.groups)
 
 
-def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
+def recode(request: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     """The streams of all segments with new values."""
-    for span in asked.spans:
-        yield _prepare(asked.source, span.first, span.stop)()
+    for span in request.spans:
+        yield _prepare(request.source, span.first, span.stop)()
 
 
 def decode(
@@ -245,8 +245,8 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
         lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns
     )
     leads = lanes.leads[residual_kernels.BEHIND :]
-    given = _exact_echoes(table, decoder)
-    fault = best_kernels.read_ordinals(tails, lanes.lattices, leads, given, decoder.rows)
+    exact = _exact_echoes(table, decoder)
+    fault = best_kernels.read_ordinals(tails, lanes.lattices, leads, exact, decoder.rows)
     if fault != -1:
         raise fault_of("tails", "lane", fault)
     for lane in np.flatnonzero(rests.scales >= 0).tolist():

@@ -62,11 +62,11 @@ def _prepare(
     return lambda: builder.build(ordinals, grids)
 
 
-def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
+def recode(request: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     """The streams of all groups with new values."""
-    builder = _builder(asked.source.layout)
-    for span in asked.spans:
-        yield _prepare(asked.source, builder, span.first, span.stop)()
+    builder = _builder(request.source.layout)
+    for span in request.spans:
+        yield _prepare(request.source, builder, span.first, span.stop)()
 
 
 def decode(

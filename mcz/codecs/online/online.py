@@ -150,9 +150,9 @@ def _is_full(
     """Return True if the segment ends before the next unit of ``n_more`` frames."""
     if n_frames + n_more > writer.layout.most_frames:
         return True
-    due = INTRA if writer.parameters["intra_period"] else LTR
+    needed = INTRA if writer.parameters["intra_period"] else LTR
     large = n_frames >= least or sum(len(unit.data) for unit in units) > TARGET_BYTES
-    return large and writer.kind() >= due
+    return large and writer.kind() >= needed
 
 
 def _segment(first: int, units: Sequence[Unit]) -> Segment:

@@ -212,17 +212,17 @@ def settle_options(params: Params) -> Settings:
 
 def choose_options(sample: Sample, chosen: Params) -> tuple[Choice, int]:
     """Fields of SPACE and the order of points, chosen from a sample."""
-    which, order = chosen["basis"], AS_IS
+    basis, order = chosen["basis"], AS_IS
     step = chosen["step"] or space_choices.default_step(sample)
     if chosen["order"] == "reordered" and sample.apart:
         # One matrix of all channels, as published.
-        if which not in ("auto", "cosines"):
-            raise OptionError(f"{NAME}: order reordered allows only basis cosines, not {which}")
-        sample, which, order = replace(sample, apart=False), "cosines", REORDERED
-    elif which == "auto":
-        which = space_choices.basis_at_hand(sample)  # as live, so that a file equals its stream
+        if basis not in ("auto", "cosines"):
+            raise OptionError(f"{NAME}: order reordered allows only basis cosines, not {basis}")
+        sample, basis, order = replace(sample, apart=False), "cosines", REORDERED
+    elif basis == "auto":
+        basis = space_choices.basis_at_hand(sample)  # as live, so that a file equals its stream
     return space_choices.choose_space(
-        NAME, sample, step, which, space_choices.frame_differences
+        NAME, sample, step, basis, space_choices.frame_differences
     ), order
 
 

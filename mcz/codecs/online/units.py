@@ -48,11 +48,11 @@ def parse_units(name: str, stream: bytes, n_frames: int) -> list[Unit]:
     units: list[Unit] = []
     at, left = 0, n_frames
     while left:  # ONLINE-08
-        what = f"{name}: unit {len(units)}"
+        label = f"{name}: unit {len(units)}"
         head, at = read_varint(stream, at)
         kind, size = head % 4, head // 4
         if kind > INTRA or not 1 <= size <= left:  # ONLINE-09, ONLINE-10, ONLINE-11
-            raise FormatError(f"{what}: kind {kind} with {size} frames of the remaining {left}")
+            raise FormatError(f"{label}: kind {kind} with {size} frames of the remaining {left}")
         distance = 0
         if kind == LTR:
             distance, at = read_varint(stream, at)
@@ -61,7 +61,7 @@ def parse_units(name: str, stream: bytes, n_frames: int) -> list[Unit]:
         if left:
             n_bytes, at = read_varint(stream, at)
         if n_bytes > len(stream) - at:  # ONLINE-12
-            raise FormatError(f"{what}: {n_bytes} bytes, but {len(stream) - at} are left")
+            raise FormatError(f"{label}: {n_bytes} bytes, but {len(stream) - at} are left")
         units.append(Unit(kind, size, stream[at : at + n_bytes], distance))
         at += n_bytes
     return units

@@ -279,19 +279,19 @@ def _plain_steps(
         own = [s for kind, s in zip(kinds, spreads, strict=True) if kind in some and s > 0]
         return code_of(float(np.median(own)) * share) if own else code_of(1.0)
 
-    moving = has_kinematics(skeleton, whole=True)
+    is_chained = has_kinematics(skeleton, whole=True)
     spatial = _spatial_kinds(skeleton)
     of_quaternions = code_of(math.radians(GREATEST_DEGREES) / 2)
     plain = [
         of_quaternions
-        if moving and turning and kind in QUATERNION_KINDS
+        if is_chained and turning and kind in QUATERNION_KINDS
         else code_of(float(spread) * share)
         if spread > 0
         else code_of(1.0)
         for kind, spread in zip(kinds, spreads, strict=True)
         if kind not in spatial
     ]
-    if moving:
+    if is_chained:
         return {"plain": plain}
     return {
         "plain": plain,
@@ -319,10 +319,10 @@ def best_levels(
     Also the bytes of a frame there, 0 if nothing was tried.
     """
     layout = source.layout
-    tried, most_frames = next(row[1:] for row in LEVELS if step_cm < row[0])
+    counts, most_frames = next(row[1:] for row in LEVELS if step_cm < row[0])
     n_frames = min(most_frames, layout.n_frames, layout.most_frames)
-    if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(tried):
-        return min(tried), 0.0
+    if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(counts):
+        return min(counts), 0.0
     values = FrameReader(NAME, source).next(n_frames)
     orders = Orders(joint_codes(fields["flags"], fields["orders"], skeleton), skeleton)
     coded = orders.to_coded_order(values)
@@ -344,21 +344,21 @@ def best_levels(
         sizes[levels] = sum(map(len, streams))
         return math.log(sizes[levels]) + EXCHANGE * math.log(max(error, 1e-300))
 
-    levels = _minimize(tried, score)
+    levels = _minimize(counts, score)
     return levels, sizes[levels] / n_frames
 
 
-def _minimize(tried: Sequence[int], score: Callable[[int], float]) -> int:
+def _minimize(counts: Sequence[int], score: Callable[[int], float]) -> int:
     """The one with the lowest score, of scores that fall and then rise."""
-    scores = [score(tried[k]) for k in (1, 2)]
+    scores = [score(counts[k]) for k in (1, 2)]
     at, way = (2, 1) if scores[1] < scores[0] else (1, -1)
     lowest = min(scores)
-    while 0 <= at + way < len(tried):
-        value = score(tried[at + way])
+    while 0 <= at + way < len(counts):
+        value = score(counts[at + way])
         if value >= lowest:
             break
         at, lowest = at + way, value
-    return tried[at]
+    return counts[at]
 
 
 def distortion(header: Header, skeleton: Skeleton, values: Floats, decoded: Floats) -> float:

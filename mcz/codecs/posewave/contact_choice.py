@@ -53,7 +53,7 @@ class ContactSettings:
     pieces: tuple[Piece, ...]
 
 
-def parse_runs(given: Any) -> Runs:
+def parse_runs(option: Any) -> Runs:
     """Contacts as text or, from Python, as tuples of a joint, a first frame and a count.
 
     "auto": wherever a foot stands by the usual rule. A joint without frames: wherever it stands.
@@ -61,15 +61,15 @@ def parse_runs(given: Any) -> Runs:
     >>> parse_runs("lfoot, rfoot:160+52")
     (('lfoot', 0, 0), ('rfoot', 160, 52))
     """
-    if given == AUTO:
+    if option == AUTO:
         return AUTO
     try:
-        if isinstance(given, str):
-            given = [_parse_entry(part.strip()) for part in given.split(",")]
-        runs = tuple((str(name), int(first), int(count)) for name, first, count in given)
+        if isinstance(option, str):
+            option = [_parse_entry(part.strip()) for part in option.split(",")]
+        runs = tuple((str(name), int(first), int(count)) for name, first, count in option)
     except (TypeError, ValueError):
         raise OptionError(
-            f"contacts is {given!r}; it must be auto or like lfoot,rfoot:160+52"
+            f"contacts is {option!r}; it must be auto or like lfoot,rfoot:160+52"
         ) from None
     for name, first, count in runs:
         if first < 0 or count < 0 or not name or (not count and first):
@@ -121,9 +121,9 @@ def runs_of(source: SignalSource, runs: Runs) -> tuple[Run, ...]:
             raise OptionError(
                 f"contacts: {name}:{first}+{count} ends after the last of {n_frames} frames"
             )
-    given = tuple(run for run in runs if run[2])
+    shifted = tuple(run for run in runs if run[2])
     alone = [name for name, _, count in runs if not count]
-    return (*given, *_detect_runs(source, skeleton, alone)) if alone else given
+    return (*shifted, *_detect_runs(source, skeleton, alone)) if alone else shifted
 
 
 def _detect_runs(

@@ -134,8 +134,8 @@ def path_of(parents: Sequence[int] | Ints, joint: int) -> list[int]:
 def make_held_points(contacts: Contacts, plan: Plan, columns: Ints, greatest: Floats) -> HeldPoints:
     """Build the held points on a plan; ``columns`` and ``greatest`` steps of the kept channels."""
     paths = [path_of(plan.parents, joint) for joint in contacts.joints]
-    moving = plan.joints != PLAIN
-    chains = [np.flatnonzero(moving & np.isin(plan.joints, path)) for path in paths]
+    is_chained = plan.joints != PLAIN
+    chains = [np.flatnonzero(is_chained & np.isin(plan.joints, path)) for path in paths]
     return HeldPoints(
         joints=np.array(contacts.joints, np.int64),
         tails=contacts.tails,

@@ -287,11 +287,11 @@ class ContactTracker:
         for stance in sorted({piece.stance for piece in pieces} - set(self.shifts)):
             own = [piece for piece in pieces if piece.stance == stance]
             first = min(piece.first for piece in own)
-            off = [
+            distances = [
                 corrections.places[p.point, p.first : p.stop] - targets[p.point, p.first : p.stop]
                 for p in own
             ]
-            shift = np.concatenate(off).mean(axis=0)
+            shift = np.concatenate(distances).mean(axis=0)
             self.shifts[stance] = self.first + first, shift
 
     def _code(
@@ -339,10 +339,10 @@ class ContactTracker:
         outcomes = []
         for piece in pieces:
             rows = slice(piece.first, piece.stop)
-            off = places[piece.point, rows] - targets[piece.point, rows]
+            shifts = places[piece.point, rows] - targets[piece.point, rows]
             origin = piece.point, piece.origin
             if piece.first + self.first == piece.origin:
-                self.origins[origin] = off[0].copy()
-            off -= self.origins[origin]
-            outcomes.append(Outcome(piece, off))
+                self.origins[origin] = shifts[0].copy()
+            shifts -= self.origins[origin]
+            outcomes.append(Outcome(piece, shifts))
         return outcomes

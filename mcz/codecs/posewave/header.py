@@ -194,12 +194,12 @@ def parse_posewave_header(header: bytes, layout: Layout) -> Header:
     turning = ANGLE_KINDS if whole else ROTATION_KINDS
     kinds = [channel.kind for channel in skeleton.channels]
     n_plain = sum(kind not in (*turning, *POSITION_KINDS) for kind in kinds)
-    for name, codes, due in (
+    for name, codes, expected in (
         ("plain", fields.plain, n_plain),
         ("weights", fields.weights, skeleton.n_joints),
     ):
-        if len(codes) not in (0, due):  # PWAVE-13, PWAVE-14
-            raise FormatError(f"{NAME}: {len(codes)} codes of {name}; expected {due}")
+        if len(codes) not in (0, expected):  # PWAVE-13, PWAVE-14
+            raise FormatError(f"{NAME}: {len(codes)} codes of {name}; expected {expected}")
     orders = joint_codes(fields.flags, fields.orders, skeleton)
     exact = _exact_mask(fields.exact, layout)
     if fields.exact and fields.contacts:  # PWAVE-39
@@ -276,13 +276,13 @@ def order_settings(
     codes: Mapping[int, int], skeleton: Skeleton
 ) -> tuple[int, list[AxisOrderFields]]:
     """The flag of vectors, or 0, and the fewest records that give these ``codes`` by joint."""
-    usual = vector_codes(skeleton)
-    odd = {
+    defaults = vector_codes(skeleton)
+    others = {
         joint: codes.get(joint, 0)
-        for joint in {*usual, *codes}
-        if codes.get(joint, 0) != usual.get(joint, 0)
+        for joint in {*defaults, *codes}
+        if codes.get(joint, 0) != defaults.get(joint, 0)
     }
-    flag, records = (VECTORS, odd) if len(odd) < len(codes) else (0, codes)
+    flag, records = (VECTORS, others) if len(others) < len(codes) else (0, codes)
     return flag, [AxisOrderFields(joint=j, code=records[j]) for j in sorted(records)]
 
 

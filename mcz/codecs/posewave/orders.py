@@ -121,12 +121,12 @@ class Orders:
         notes = np.zeros((len(coded), len(self.places), N_NOTES), np.int64)
         for index, place in enumerate(self.places):
             angles = self._reorder_axes(coded, place, place.coded, place.own)
-            given, own = source[:, place.columns], notes[:, index]
+            turns, own = source[:, place.columns], notes[:, index]
             order_kernels.choose_switches(
-                angles, given, place.own, self.full, PRICE * self.full, own
+                angles, turns, place.own, self.full, PRICE * self.full, own
             )
             order_kernels.follow_angles(angles, place.own, self.full, own)
-            order_kernels.choose_turns(angles, given, self.full, own)
+            order_kernels.choose_turns(angles, turns, self.full, own)
         return _build_notes(notes), self.values(coded, notes)
 
     def read_notes(self, stream: bytes, n_frames: int, where: str) -> tuple[Ints, bytes]:

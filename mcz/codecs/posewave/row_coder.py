@@ -28,18 +28,18 @@ CARRIED = 40.0  # rows at most that the coarser levels count for
 class Stream:
     """The bytes of a level, written or read; ``coder`` is passed from one to the next."""
 
-    def __init__(self, coder: Ints, size: int, given: bytes | None) -> None:
+    def __init__(self, coder: Ints, size: int, stream: bytes | None) -> None:
         self.coder = coder
         self.data = (
-            np.zeros(size, np.uint8) if given is None else np.frombuffer(given, np.uint8).copy()
+            np.zeros(size, np.uint8) if stream is None else np.frombuffer(stream, np.uint8).copy()
         )
-        mixing.start(coder, self.data, 1 if given is None else 0)
+        mixing.start(coder, self.data, 1 if stream is None else 0)
 
     def finish(self) -> bytes:
-        used = int(mixing.finish(self.coder, self.data))
-        if used > len(self.data):
-            raise AssertionError(f"{used} bytes in {len(self.data)}")
-        return self.data[:used].tobytes()
+        n_bytes = int(mixing.finish(self.coder, self.data))
+        if n_bytes > len(self.data):
+            raise AssertionError(f"{n_bytes} bytes in {len(self.data)}")
+        return self.data[:n_bytes].tobytes()
 
     @property
     def is_whole(self) -> bool:

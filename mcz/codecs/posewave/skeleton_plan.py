@@ -123,10 +123,10 @@ def make_plan(
     frames = [orientation(joint, rule) for joint in skeleton.joints]
     moves, move_starts, directions = _moves(skeleton, frames, numbers)
     turns, turn_starts = _turns(skeleton, numbers, orders or {}, whole)
-    moving = {column for _, column, _ in turns}
+    turning = {column for _, column, _ in turns}
     if has_kinematics(skeleton, whole):
-        moving |= {column for column, _ in moves}
-    joints, starts, path = _rows(skeleton, numbers, int(np.count_nonzero(kept)), moving)
+        turning |= {column for column, _ in moves}
+    joints, starts, path = _rows(skeleton, numbers, int(np.count_nonzero(kept)), turning)
     return Plan(
         parents=skeleton.parents,
         changes=_floats(map(_change, _aboves(skeleton, frames), frames), 3, 3),
@@ -147,9 +147,9 @@ def make_plan(
     )
 
 
-def bounded_regularization(given: Floats) -> Floats:
+def bounded_regularization(diagonal: Floats) -> Floats:
     """Regularization within the range that factors can take."""
-    return np.clip(given, LEAST_REGULARIZATION, GREATEST_REGULARIZATION)
+    return np.clip(diagonal, LEAST_REGULARIZATION, GREATEST_REGULARIZATION)
 
 
 def limit_number(value: float) -> float:
@@ -271,7 +271,7 @@ def _whole(joint: Joint, start: int, numbers: list[int]) -> list[list[Turn]]:
 
 
 def _rows(
-    skeleton: Skeleton, numbers: list[int], n_kept: int, moving: set[int]
+    skeleton: Skeleton, numbers: list[int], n_kept: int, turning: set[int]
 ) -> tuple[list[int], list[int], list[int]]:
     """The joint of each kept channel, where its row starts, and the rows."""
     joints = [PLAIN] * n_kept
@@ -281,7 +281,7 @@ def _rows(
     for index, joint in enumerate(skeleton.joints):
         path = paths[joint.parent] if joint.parent >= 0 else []
         columns = range(column, column + len(joint.channels))
-        own = [numbers[c] for c in columns if numbers[c] >= 0 and c in moving]
+        own = [numbers[c] for c in columns if numbers[c] >= 0 and c in turning]
         if len(path) + len(own) > MAX_PATH:  # POSE-02
             path = []
         for number in own:

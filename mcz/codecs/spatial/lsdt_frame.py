@@ -104,8 +104,8 @@ def _vectors(coder: _Coder, source: SignalSource, length: int) -> Iterator[Ints]
         yield from np.split(indices, coder.space.starts[1:-1], axis=1)
 
 
-def _segments(source: SignalSource, coder: _Coder, given: int) -> Iterator[Segment]:
-    """Segments of ``given`` frames, or, if 0, of as many as make a DATA of the usual size."""
+def _segments(source: SignalSource, coder: _Coder, length: int) -> Iterator[Segment]:
+    """Segments of ``length`` frames, or, if 0, of as many as make a DATA of the usual size."""
     layout = source.layout
     if not layout.n_channels:
         if layout.n_frames:
@@ -117,7 +117,7 @@ def _segments(source: SignalSource, coder: _Coder, given: int) -> Iterator[Segme
         coder.restart()
         return (coder.build(coder.quantize(frames(first, stop))),)
 
-    lengths = Lengths(min(given or SEGMENT_FRAMES, layout.most_frames), bool(given))
+    lengths = Lengths(min(length or SEGMENT_FRAMES, layout.most_frames), bool(length))
     for first, stop, streams in segments_by_halving(layout.n_frames, lengths, code):
         yield Segment(first, stop - first, streams)
 
@@ -235,16 +235,16 @@ class _Coder:
         return stream
 
     def _parse(self, stream: bytes, indices: Ints, *, whole: bool) -> None:
-        what = f"{NAME}: a coefficient"
+        label = f"{NAME}: a coefficient"
         if self.codes is not None:
             # FRAME-06
-            parse_vectors(stream, indices, self.space.starts, self.codes, what, whole=whole)
+            parse_vectors(stream, indices, self.space.starts, self.codes, label, whole=whole)
             return
         decode_stream(
             stream,
             self._models,  # FRAME-07
             lambda state, data: self._code(state, data, indices),
-            what,
+            label,
             whole=whole,
         )
         self._begins = 0

@@ -103,12 +103,12 @@ class Windows:
     """A signal window by window, repeatable, in units of the channels' weights."""
 
     def __init__(
-        self, name: str, source: SignalSource, sample: Sample, asked: WindowOptions
+        self, name: str, source: SignalSource, sample: Sample, options: WindowOptions
     ) -> None:
         self.name, self.source, self.sample = name, source, sample
         n_frames = source.layout.n_frames
-        self.n_frames, self.window = n_frames, max(1, min(asked.window, n_frames))
-        self.step, self.limit = asked.step, LARGEST * asked.step
+        self.n_frames, self.window = n_frames, max(1, min(options.window, n_frames))
+        self.step, self.limit = options.step, LARGEST * options.step
         self.weights = np.ones(source.layout.n_channels)
         if sample.codes is not None:
             self.weights = np.array([ratio_of(code) for code in sample.codes])
@@ -128,7 +128,7 @@ def plan_of(
     name: str,
     source: SignalSource,
     sample: Sample,
-    asked: WindowOptions,
+    options: WindowOptions,
     *,
     apart: bool,
     mean: bool,
@@ -140,13 +140,13 @@ def plan_of(
     there is a basis in time too, unless windows are too long. Raises MotionError for values that
     cannot be coded.
     """
-    windows = Windows(name, source, sample, asked)
+    windows = Windows(name, source, sample, options)
     courses = courses and windows.window <= LONGEST
     fields = SpaceFields(
         flags=WEIGHTED if sample.codes else 0,
         basis=COSINES,
         model=None,
-        step=asked.step,
+        step=options.step,
         weights=list(sample.codes) if sample.codes else None,
     )
     models: tuple[Model, ...] = ()
@@ -155,20 +155,20 @@ def plan_of(
         if len(windows.weights) > MAX_POINTS * (3 if apart else 1):
             raise MotionError(f"{name}: {len(windows.weights)} channels are more than {MAX_POINTS}")
         clip_fit = fit(windows, apart=apart, mean=mean, courses=courses)
-        bases, n_frequencies = _bases(windows, clip_fit, asked)
+        bases, n_frequencies = _bases(windows, clip_fit, options)
         models = (build_model(bases),)
         fields.basis, fields.model = LEARNED, model_id(models[0])
-        there = ((APART, apart), (MEAN, mean), (COURSES, courses))
-        fields.flags |= sum(flag for flag, is_there in there if is_there)
+        candidates = ((APART, apart), (MEAN, mean), (COURSES, courses))
+        fields.flags |= sum(flag for flag, is_there in candidates if is_there)
     return Plan(
         windows.window,
         n_frequencies,
         fields,
         models,
         (),
-        asked.threshold,
-        asked.segment_frames,
-        asked.prefix,
+        options.threshold,
+        options.segment_frames,
+        options.prefix,
     )
 
 
@@ -213,8 +213,8 @@ def _mean(windows: Windows) -> tuple[Floats, Basis]:
     entries = np.clip(np.rint(np.ldexp(plain, shift)), -MAX_ENTRY, MAX_ENTRY)
     stored = Basis(shift[None], entries[None].astype(np.int64))
     near = stored.vectors[0] / windows.weights
-    off = float(np.abs(near - mean).max()) > windows.step / MEAN_STEPS
-    return near if off else mean, stored
+    is_off = float(np.abs(near - mean).max()) > windows.step / MEAN_STEPS
+    return near if is_off else mean, stored
 
 
 @lru_cache(maxsize=8)
@@ -230,27 +230,27 @@ def _principal(products: bytes, n: int) -> tuple[Floats, Floats]:
 
 
 def _bases(
-    windows: Windows, clip_fit: Fit, asked: WindowOptions
+    windows: Windows, clip_fit: Fit, options: WindowOptions
 ) -> tuple[list[Basis | Floats], int]:
-    room = ROOM if clip_fit.courses is None else ROOM // 2
-    most = min(clip_fit.columns.shape[1], room // clip_fit.columns.size)
+    limit = ROOM if clip_fit.courses is None else ROOM // 2
+    most = min(clip_fit.columns.shape[1], limit // clip_fit.columns.size)
     spatial = [
-        _round_vectors(vectors[:most], energies[:most], asked.step)
+        _round_vectors(vectors[:most], energies[:most], options.step)
         for vectors, energies in zip(clip_fit.vectors, clip_fit.energies, strict=True)
     ]
     in_time: Basis | None = None
     if clip_fit.courses is not None and clip_fit.course_energies is not None:
-        in_time = _round_vectors(clip_fit.courses, clip_fit.course_energies, asked.step)
-    gains = _gains(windows, clip_fit, [len(b.shifts) for b in spatial], in_time, asked)
-    ranks, n_frequencies = _counts(gains, spatial, in_time, asked)
+        in_time = _round_vectors(clip_fit.courses, clip_fit.course_energies, options.step)
+    gains = _gains(windows, clip_fit, [len(b.shifts) for b in spatial], in_time, options)
+    ranks, n_frequencies = _counts(gains, spatial, in_time, options)
     bases: list[Basis | Floats] = [
         _truncate_basis(b, r) for b, r in zip(spatial, ranks, strict=True)
     ]
     if in_time is not None:
         in_time = _truncate_basis(in_time, n_frequencies)
-        used = int(np.flatnonzero(in_time.entries.any(axis=0)).max(initial=0)) + 1
-        used = max(used, n_frequencies)
-        bases.append(Basis(in_time.shifts, in_time.entries[:, :used]))
+        n_used = int(np.flatnonzero(in_time.entries.any(axis=0)).max(initial=0)) + 1
+        n_used = max(n_used, n_frequencies)
+        bases.append(Basis(in_time.shifts, in_time.entries[:, :n_used]))
     if clip_fit.stored is not None:
         bases.append(clip_fit.stored)
     return bases, n_frequencies
@@ -273,7 +273,7 @@ def _gains(
     clip_fit: Fit,
     counts: Sequence[int],
     in_time: Basis | None,
-    asked: WindowOptions,
+    options: WindowOptions,
 ) -> list[Floats]:
     """Gain of each coefficient over all windows, in squared steps: (vectors, frequencies).
 
@@ -285,17 +285,17 @@ def _gains(
         temporal = dct_matrix(len(values))[:n_frequencies]
         if clip_fit.courses is not None and len(values) == windows.window:
             temporal = clip_fit.courses[:n_frequencies] @ dct_matrix(len(values))
-        rows = (temporal @ ((values - clip_fit.mean) / asked.step)).T
+        rows = (temporal @ ((values - clip_fit.mean) / options.step)).T
         parts = zip(gains, clip_fit.columns, clip_fit.vectors, strict=True)
         for gain, columns, vectors in parts:
             sizes = np.abs(vectors[: len(gain)] @ rows[columns])
             worth = sizes**2 - 1 / 12 - BIT * (PER_ONE + PER_OCTAVE * np.log2(1 + sizes))
-            gain[:, : sizes.shape[1]] += np.where(sizes >= asked.threshold, worth, 0.0)
+            gain[:, : sizes.shape[1]] += np.where(sizes >= options.threshold, worth, 0.0)
     return gains
 
 
 def _counts(
-    gains: Sequence[Floats], spatial: Sequence[Basis], in_time: Basis | None, asked: WindowOptions
+    gains: Sequence[Floats], spatial: Sequence[Basis], in_time: Basis | None, options: WindowOptions
 ) -> tuple[list[int], int]:
     """The vectors of each matrix and the frequencies with which the sum of gains is greatest."""
     total = np.zeros(gains[0].shape[1])
@@ -305,11 +305,11 @@ def _counts(
     for gain, basis in zip(gains, spatial, strict=True):
         sums = gain.cumsum(axis=0).cumsum(axis=1) - _cost(basis)[:, None]
         best = sums.argmax(axis=0)
-        if asked.rank is not None:
-            best = np.full(len(best), min(asked.rank, len(basis.shifts)) - 1)
+        if options.rank is not None:
+            best = np.full(len(best), min(options.rank, len(basis.shifts)) - 1)
         total += np.take_along_axis(sums, best[None], axis=0)[0]
         ranks.append(best)
-    at = int(total.argmax()) if asked.frequencies is None else asked.frequencies - 1
+    at = int(total.argmax()) if options.frequencies is None else options.frequencies - 1
     at = min(at, len(total) - 1)
     return [int(best[at]) + 1 for best in ranks], at + 1
 

@@ -67,8 +67,8 @@ def encode_mdtt(source: SignalSource, params: Params) -> Encoded:
     """Encode as ``encode_lsdt_clip``, in space with bases fitted to this clip."""
     sample = space_choices.sample_of("mdtt", source)
     step = params["step"] or space_choices.default_step(sample)
-    asked = window_options(params, preset_values(MDTT_PRESETS, params), step)
-    plan = plan_of("mdtt", source, sample, asked, apart=sample.apart, mean=False, courses=False)
+    options = window_options(params, preset_values(MDTT_PRESETS, params), step)
+    plan = plan_of("mdtt", source, sample, options, apart=sample.apart, mean=False, courses=False)
     return windows.encode("mdtt", source, plan)
 
 
@@ -76,8 +76,8 @@ def encode_pca_rdo(source: SignalSource, params: Params) -> Encoded:
     """Encode as ``encode_lsdt_clip``, with a mean, components and courses fitted to this clip."""
     sample = space_choices.sample_of("pca-rdo", source)
     step = params["step"] or space_choices.default_step(sample)
-    asked = window_options(params, preset_values(PCA_RDO_PRESETS, params), step)
-    plan = plan_of("pca-rdo", source, sample, asked, apart=False, mean=True, courses=True)
+    options = window_options(params, preset_values(PCA_RDO_PRESETS, params), step)
+    plan = plan_of("pca-rdo", source, sample, options, apart=False, mean=True, courses=True)
     return windows.encode("pca-rdo", source, plan)
 
 

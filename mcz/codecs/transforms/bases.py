@@ -285,8 +285,8 @@ def haar_basis(n_points: int) -> Floats:
     details: list[Floats] = []
     for _ in range(HAAR_LEVELS):
         pairs = list(zip(approx[::2], approx[1::2], strict=False))
-        odd = approx[2 * len(pairs) :]
-        approx = [(a + b) / np.sqrt(2) for a, b in pairs] + odd
+        last = approx[2 * len(pairs) :]
+        approx = [(a + b) / np.sqrt(2) for a, b in pairs] + last
         details = [(a - b) / np.sqrt(2) for a, b in pairs] + details
     return np.array(approx + details)
 

@@ -212,15 +212,15 @@ def choose(
     after = anneal(counts, worth, starts, tails.ravel(), iterations, seed)
     kept = np.zeros((n_channels, n_each), np.bool_)
     np.put_along_axis(kept, order, np.arange(n_each) < counts[:, None], axis=1)
-    shown = np.where(kept, sizes, np.inf)
+    masked = np.where(kept, sizes, np.inf)
     dropped = np.max(np.where(kept, 0.0, sizes), axis=1, initial=0.0)
     if whole_approximation:
         kept[:, : n_bands[0]] = True
     return Choice(
         np.split(kept.T, np.cumsum(n_bands)[:-1]),
         counts,
-        np.min(shown, axis=1, initial=np.inf),
-        np.min(shown[:, n_bands[0] :], axis=1, initial=np.inf),
+        np.min(masked, axis=1, initial=np.inf),
+        np.min(masked[:, n_bands[0] :], axis=1, initial=np.inf),
         dropped,
         np.max(sizes, axis=1, initial=0.0),
         before,

@@ -43,17 +43,17 @@ def recoder(weigh: Weigh) -> Recode:
     Otherwise the ``weigh`` of its encoder decides which coefficients are small.
     """
 
-    def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
+    def recode(request: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
         """The streams of some channels with new values, with the steps of the header."""
-        fields = parse(WaveletHeader, asked.header, f"{NAME} header")
-        quantizer = _quantizer(fields, asked, *weigh(asked.source, asked.options))
+        fields = parse(WaveletHeader, request.header, f"{NAME} header")
+        quantizer = _quantizer(fields, request, *weigh(request.source, request.options))
         plan = Plan(NAME, _transform(fields), quantizer, 0)
-        part = SubsetSource(asked.source, asked.groups, fields.coded_frames)
+        part = SubsetSource(request.source, request.groups, fields.coded_frames)
         frames = Frames(NAME, part, plan.wavelet, plan.levels)
-        for span in asked.spans:
+        for span in request.spans:
             streams = segment_streams(frames, plan, span.first, span.stop)
             frames.keep(span.first, span.stop)
-            yield streams[: asked.source.layout.n_resolutions * len(asked.groups)]
+            yield streams[: request.source.layout.n_resolutions * len(request.groups)]
 
     return recode
 
@@ -68,15 +68,15 @@ def _transform(fields: WaveletHeader) -> Transform:
 
 
 def _quantizer(
-    fields: WaveletHeader, asked: RecodeRequest, weights: Floats, threshold: float | None
+    fields: WaveletHeader, request: RecodeRequest, weights: Floats, threshold: float | None
 ) -> Quantizer:
-    columns = [column for group in asked.groups for column in asked.source.layout.groups[group]]
+    columns = [column for group in request.groups for column in request.source.layout.groups[group]]
     own = weights[columns]
     if fields.unit is not None:  # decimals are SCALED
         unit = fields.unit
         codes = tuple(
-            _step_code(group, asked, code_of(float(weight)))
-            for group, weight in zip(asked.groups, own, strict=True)
+            _step_code(group, request, code_of(float(weight)))
+            for group, weight in zip(request.groups, own, strict=True)
         )
         return _FixedQuantizer(DEAD_ZONE * unit * own, None, unit, codes, fields.least)
     if threshold is None:
@@ -85,10 +85,10 @@ def _quantizer(
     return _FixedQuantizer(threshold * own, fields.decimals, 1.0, (0,) * len(own), fields.least)
 
 
-def _step_code(group: int, asked: RecodeRequest, default: int) -> int:
+def _step_code(group: int, request: RecodeRequest, default: int) -> int:
     """The step code of a channel, ``default`` if it was always 0."""
-    for segment in range(len(asked.spans)):
-        stream = asked.fetch(segment, 0, group)
+    for segment in range(len(request.spans)):
+        stream = request.fetch(segment, 0, group)
         if len(stream) > 1:
             return stream[1]
     return default

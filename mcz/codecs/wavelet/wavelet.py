@@ -236,7 +236,7 @@ class _Decoder:
         # Band 0 is the approximation, band b > 0 the details of level levels + 1 - b.
         band_ranges = [ranges[levels], *(ranges[levels + 1 - band] for band in range(1, n_bands))]
         bands = [np.zeros((stop - start, len(request.groups))) for start, stop in band_ranges]
-        due = band_ranges[0][0]
+        end = band_ranges[0][0]
         # Frames of the requested coefficients; the last segment has those beyond the end too.
         scales = [self._level(band) for band in range(n_bands)]
         low = min(need[0] << level for need, level in zip(band_ranges, scales, strict=True))
@@ -251,16 +251,16 @@ class _Decoder:
             pairs = zip(owns, band_ranges, strict=True)
             if all(own[1] <= need[0] or need[1] <= own[0] for own, need in pairs):
                 continue
-            if owns[0][0] > due:
+            if owns[0][0] > end:
                 break
-            due = owns[0][1]
+            end = owns[0][1]
             for column, group in enumerate(request.groups):
                 stream = partial(_stream, fetch, index, group)
                 self._fill(bands, column, owns, band_ranges, stream)
-        if due < band_ranges[0][1]:  # MRDWT-18
+        if end < band_ranges[0][1]:  # MRDWT-18
             raise FormatError(
                 f"{NAME}: frames {request.start}:{request.stop} need approximations up to "
-                f"{band_ranges[0][1]}, but they end at {due}"
+                f"{band_ranges[0][1]}, but they end at {end}"
             )
         absent = np.zeros((0, len(request.groups)))
         bands += [absent] * (levels + 1 - n_bands)

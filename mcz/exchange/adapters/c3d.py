@@ -126,14 +126,14 @@ def to_ezc3d(motion: Motion) -> c3d:
     for signal in plain.signals:
         if signal.role in arrays:
             array, chosen = arrays[signal.role]
-            there, values = array[chosen], signal.masked().T
-            if there.size != values.size:
+            target, values = array[chosen], signal.masked().T
+            if target.size != values.size:
                 raise MotionError(
                     f"signal {signal.name!r} has {values.size} numbers, but ezc3d reads "
-                    f"{there.size}",
+                    f"{target.size}",
                     clip=motion.name,
                 )
-            array[chosen] = values.reshape(there.shape)
+            array[chosen] = values.reshape(target.shape)
     return file
 
 

@@ -204,9 +204,9 @@ def _part(
     joints, numbers = [], []
     for number, (index, kinds) in enumerate(chosen):
         joint = skeleton.joints[index]
-        kept = [k for k, channel in enumerate(joint.channels) if channel.kind in kinds]
-        numbers += [skeleton.columns(index)[k] for k in kept]
-        channels = tuple(joint.channels[k] for k in kept)
+        columns = [k for k, channel in enumerate(joint.channels) if channel.kind in kinds]
+        numbers += [skeleton.columns(index)[k] for k in columns]
+        channels = tuple(joint.channels[k] for k in columns)
         offset = joint.offset if kinds == POSITION_KINDS else ORIGIN
         joints.append(replace(joint, parent=number - 1, offset=offset, channels=channels))
     part = replace(skeleton, joints=tuple(joints), base=None, source=None)
@@ -279,8 +279,8 @@ class _Bones:
         positions = [k for k, kind in enumerate(kinds) if kind in POSITION_KINDS]
         turns = [k for k, kind in enumerate(kinds) if kind in ROTATION_KINDS]
         # About turned axes from first to last is about fixed axes from last to first.
-        kept = [*(positions if parent < 0 else []), *reversed(turns)]
-        self.columns += [columns[k] for k in kept]
+        channels = [*(positions if parent < 0 else []), *reversed(turns)]
+        self.columns += [columns[k] for k in channels]
         bone = Joint(
             "root" if parent < 0 else self._name(joint.name),
             parent,
@@ -288,7 +288,7 @@ class _Bones:
             () if parent < 0 else (tail,),
             joint.axis,
             joint.axis_order,
-            tuple(Channel(kinds[k]) for k in kept),
+            tuple(Channel(kinds[k]) for k in channels),
         )
         return self._add(bone)
 

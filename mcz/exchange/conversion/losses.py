@@ -82,9 +82,11 @@ def _acclaim_names(motion: Motion) -> Iterator[str]:
     if roots and roots[0] != ROOT:
         yield f"joint {roots[0]!r} is called {ROOT}"
     bones = [joint.name for joint in motion.skeleton.joints if joint.parent >= 0]
-    odd = [name for name in bones if not name or any(c <= " " or c in "()" for c in name)]
-    if odd:
-        names = ", ".join(map(repr, odd[:MOST_NAMES])) + (" ..." if len(odd) > MOST_NAMES else "")
+    unnamable = [name for name in bones if not name or any(c <= " " or c in "()" for c in name)]
+    if unnamable:
+        names = ", ".join(map(repr, unnamable[:MOST_NAMES])) + (
+            " ..." if len(unnamable) > MOST_NAMES else ""
+        )
         yield f"ASF cannot hold the joint names {names}: they have _ instead"
 
 
@@ -99,7 +101,7 @@ def recording_facts(recorded: Recording | None) -> Iterator[str]:
     if recorded is None:
         return
     counts = ((len(recorded.events), "event"), (len(recorded.platforms), "force platform"))
-    facts = [f"{count} {what}{'s' if count > 1 else ''}" for count, what in counts if count]
+    facts = [f"{count} {noun}{'s' if count > 1 else ''}" for count, noun in counts if count]
     if facts:
         yield f"left out: {', '.join(facts)}"
 
@@ -177,13 +179,13 @@ def describe_lost_times(motion: Motion, to: str) -> Iterator[str]:
         frames, step = numbers.astype(np.float64) - 1, motion.number_step
     elif to == "c3d":
         frames += first_number(motion) - 1
-    stated, times = frames / float(rate * step), line.regular_times
+    even, times = frames / float(rate * step), line.regular_times
     allowed = line.rounding + TOLERANCE
-    if abs(times[0] - stated[0]) > allowed:
-        first = f"{times[0]:.6g} s: {name} begins at {stated[0]:.6g} s"
+    if abs(times[0] - even[0]) > allowed:
+        first = f"{times[0]:.6g} s: {name} begins at {even[0]:.6g} s"
         yield f"left out: the time of the first frame, {first}"
-    off = (times - times[0]) - (stated - stated[0])
-    if np.abs(off).max() <= 2 * allowed:
+    errors = (times - times[0]) - (even - even[0])
+    if np.abs(errors).max() <= 2 * allowed:
         return
     gaps = np.diff(times)[np.isnan(line.steps)]
     if len(gaps):

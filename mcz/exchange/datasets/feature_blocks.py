@@ -177,11 +177,11 @@ class Blocks:
     """The features of clips, from open files or from the cache; threads may share it."""
 
     def __init__(
-        self, settings: DatasetSettings, members: Sequence[Member], given: Mapping[str, File]
+        self, settings: DatasetSettings, members: Sequence[Member], files: Mapping[str, File]
     ) -> None:
         self._recipe = settings.recipe
         targets = {member.target for member in members}
-        self.sources = OpenFiles(given, settings.decoded_bytes, len(targets))
+        self.sources = OpenFiles(files, settings.decoded_bytes, len(targets))
         self._keys: dict[Member, str] = {}
         self.cache: Cache = (
             MemoryCache(settings.feature_bytes)

@@ -41,10 +41,10 @@ def find_field(name: str) -> Field:
 
 def parse_fields(names: str | Iterable[str]) -> tuple[Field, ...]:
     """The fields of these names, a list or a text with commas; raises OptionError."""
-    listed = [n.strip() for n in names.split(",")] if isinstance(names, str) else list(names)
-    if not listed or len(set(listed)) != len(listed) or not all(listed):
+    entries = [n.strip() for n in names.split(",")] if isinstance(names, str) else list(names)
+    if not entries or len(set(entries)) != len(entries) or not all(entries):
         raise OptionError(f"fields is {names!r}; name at least one field, and none twice")
-    return tuple(find_field(str(name)) for name in listed)
+    return tuple(find_field(str(name)) for name in entries)
 
 
 def _signal(name: str) -> Field:

@@ -219,12 +219,12 @@ class _Agreement:
             self._first = member, facts_of_member
             return
         first, facts = self._first
-        for what, advice in ADVICE.items():
-            if facts[what] != facts_of_member[what]:
-                values = facts_of_member[what], facts[what]
+        for fact, advice in ADVICE.items():
+            if facts[fact] != facts_of_member[fact]:
+                values = facts_of_member[fact], facts[fact]
                 raise OptionError(
                     f"{member.label} has {_short(*values)}, {first.label} has "
-                    f"{_short(*values[::-1])}: {what} differ; {advice}"
+                    f"{_short(*values[::-1])}: {fact} differ; {advice}"
                 )
 
     def _facts(self, clip: Clip, member: Member) -> JsonObject:

@@ -106,8 +106,8 @@ class OpenFiles:
     ``runs_bytes`` bounds what all of them keep of decoded frames. Threads may share it.
     """
 
-    def __init__(self, given: Mapping[str, File], runs_bytes: int, n_targets: int) -> None:
-        self._given = dict(given)
+    def __init__(self, files: Mapping[str, File], runs_bytes: int, n_targets: int) -> None:
+        self._given = dict(files)
         self._runs = DecodedCache(runs_bytes)
         self._open: OrderedDict[str, File] = OrderedDict()
         self._subjects: OrderedDict[tuple[object, ...], Subject] = OrderedDict()

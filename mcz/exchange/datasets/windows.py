@@ -60,11 +60,11 @@ class Dataset:
         self,
         settings: DatasetSettings,
         members: Sequence[Member],
-        given: Mapping[str, File],
+        files: Mapping[str, File],
         skipped: Sequence[Member] = (),
         blocks: Blocks | None = None,
     ) -> None:
-        self._settings, self._given = settings, dict(given)
+        self._settings, self._given = settings, dict(files)
         self.members, self.skipped = tuple(members), tuple(skipped)
         counts = [self._count(member) for member in self.members]
         self._ends = np.cumsum(counts, dtype=np.int64)
@@ -94,10 +94,10 @@ class Dataset:
 
     def __repr__(self) -> str:
         window = self._settings.window
-        what = "whole clips" if window is None else f"windows of {count_text(window, 'frame')}"
+        noun = "whole clips" if window is None else f"windows of {count_text(window, 'frame')}"
         clips = count_text(len({member.label for member in self.members}), "clip")
         short = f", {len(self.skipped)} too short" if self.skipped else ""
-        return f"<Dataset: {len(self)} {what} of {clips}{short}: {', '.join(self.fields)}>"
+        return f"<Dataset: {len(self)} {noun} of {clips}{short}: {', '.join(self.fields)}>"
 
     def __len__(self) -> int:
         return int(self._ends[-1]) if len(self._ends) else 0
@@ -151,11 +151,11 @@ class Dataset:
         return Window(member.target, member.clip, first + start, first + stop, time)
 
     def _place(self, number: int) -> tuple[Member, int, int]:
-        which = int(np.searchsorted(self._ends, number, side="right"))
-        member = self.members[which]
+        index = int(np.searchsorted(self._ends, number, side="right"))
+        member = self.members[index]
         if self._settings.window is None:
             return member, 0, member.n_frames
-        before = int(self._ends[which - 1]) if which else 0
+        before = int(self._ends[index - 1]) if index else 0
         start = (number - before) * self._settings.stride
         return member, start, start + self._settings.window
 
@@ -267,9 +267,9 @@ class Dataset:
     def _runs(self) -> list[tuple[NDArray[np.int64], int]]:
         """Windows in runs of some blocks of a clip, each with the frames that it needs."""
         runs = []
-        for which, member in enumerate(self.members):
-            before = int(self._ends[which - 1]) if which else 0
-            numbers = np.arange(before, int(self._ends[which]))
+        for index, member in enumerate(self.members):
+            before = int(self._ends[index - 1]) if index else 0
+            numbers = np.arange(before, int(self._ends[index]))
             each = max(1, RUN_BLOCKS * BLOCK // self._settings.stride)
             if self._settings.recipe.is_whole:
                 each = max(1, len(numbers))

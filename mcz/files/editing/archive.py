@@ -95,8 +95,8 @@ def pack(
     )
     encoding = encoding_options(codec, effort, params)
     limits = profile_named(profile)
-    named = [(path, path.relative_to(root).as_posix()) for path in paths]
-    entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
+    files = [(path, path.relative_to(root).as_posix()) for path in paths]
+    entries = [SourceEncoder(path, name, options, encoding) for path, name in files]
     inputs = (*paths, *encoding.params.values())
     with (
         limit_threads(threads),
@@ -198,7 +198,7 @@ def append(
         growing(grown, salvage=salvage, force=force) as growth,
     ):
         container = growth.container
-        paths, seen = stored_files(container)
+        paths, content = stored_files(container)
         has_copies = bool(container.copies()) if copies is None else copies
         transaction = WriteTransaction(
             growth.added,
@@ -209,7 +209,7 @@ def append(
             uncopied=container.uncopied() if has_copies else (),
         )
         before = File(container) if archives else None  # before anything is added
-        report = _write_entries(transaction, entries, progress, seen)
+        report = _write_entries(transaction, entries, progress, content)
         if report.failures:
             words, hints = zip(*(split_hint(o.message) for o in report.failures), strict=True)
             raise SourceError("; ".join(words), hint=hints[0] if len(set(hints)) == 1 else None)
@@ -238,13 +238,13 @@ def _write_entries(
     transaction: WriteTransaction,
     entries: Sequence[SourceEncoder],
     progress: Progress | None,
-    seen: Content | None = None,
+    content: Content | None = None,
 ) -> Report:
-    """Write the files; ``seen``: contents of the target by digest."""
+    """Write the files; ``content``: contents of the target by digest."""
     report = Report()
-    seen = {} if seen is None else seen
-    with encode_ahead(entries, transaction, seen) as in_turn:
-        write_in_turn(transaction, in_turn, len(entries), report, progress, seen)
+    content = {} if content is None else content
+    with encode_ahead(entries, transaction, content) as in_turn:
+        write_in_turn(transaction, in_turn, len(entries), report, progress, content)
     return report
 
 
@@ -254,13 +254,13 @@ def write_in_turn(
     total: int,
     report: Report,
     progress: Progress | None,
-    seen: Content,
+    content: Content,
 ) -> None:
     """Write one file after the other; ``report`` gets the outcome of each."""
     for done, entry in enumerate(entries):
         size = entry.size if isinstance(entry, RemotePart) else size_of(entry.path)
         try:
-            result = _write_entry(transaction, entry, seen)
+            result = _write_entry(transaction, entry, content)
             notes = tuple(filter(None, (entry.remark, *entry.notes)))
             report.outcomes.append(Outcome(entry.name, result, size, entry.reason, notes))
         except MczError as error:
@@ -271,25 +271,25 @@ def write_in_turn(
             progress(done + 1, total, entry.name)
 
 
-def _write_entry(transaction: WriteTransaction, entry: SourceEncoder, seen: Content) -> str:
+def _write_entry(transaction: WriteTransaction, entry: SourceEncoder, content: Content) -> str:
     """Write one file, or an alias if the same bytes are stored already."""
     digest = entry.digest()
     depends = wants_skeleton(entry.path)  # its values depend on the ASF next to it
     writer = transaction.writer
-    if digest in seen and not depends and not transaction.holds(entry.name, digest):
+    if digest in content and not depends and not transaction.holds(entry.name, digest):
         check_name(entry.name)
         with transaction.step():
-            writer.alias(entry.name, *seen[digest])
+            writer.alias(entry.name, *content[digest])
         transaction.paths[entry.name] = digest
         return "alias"
     clips, attachments = len(writer.directory.clips), len(writer.directory.attachments)
     result = entry.write(transaction)
     if len(writer.directory.clips) > clips:
         name = next(reversed(writer.directory.clips))
-        seen[digest] = (payloads.OF_CLIP, name.encode())
+        content[digest] = (payloads.OF_CLIP, name.encode())
         transaction.clips[entry.name] = name
     elif len(writer.directory.attachments) > attachments:
-        seen[digest] = (payloads.OF_ATTACHMENT, entry.name.encode())
+        content[digest] = (payloads.OF_ATTACHMENT, entry.name.encode())
     return result
 
 
@@ -298,16 +298,16 @@ Named = Sequence[tuple[Path, str]]  # files, each with its path in the archive
 
 
 @contextmanager
-def superseding(target: Path, named: Named) -> Iterator[Path]:
-    """The path of a file to append ``named`` to: a copy, if it must replace older contents.
+def superseding(target: Path, files: Named) -> Iterator[Path]:
+    """The path of a file to append ``files`` to: a copy, if it must replace older contents.
 
     The copy lacks these, and takes the place of ``target`` when the block succeeds. Metadata of a
     replaced clip are set for the new one. Raises OptionError if an alias has the same content.
     """
     old: list[str] = []
-    if named:
+    if files:
         with open(target) as file:
-            old, metadata = _find_superseded(file, named)
+            old, metadata = _find_superseded(file, files)
     if not old:
         yield target
         return
@@ -326,17 +326,17 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
         os.replace(copy, target)
 
 
-def _find_superseded(file: File, named: Named) -> tuple[list[str], Said]:
+def _find_superseded(file: File, files: Named) -> tuple[list[str], Said]:
     """The items from the same paths, and their metadata by path."""
     paths, _ = stored_files(file.container)
     clips = {clip.source.path: clip for clip in file.clips.values() if clip.source is not None}
     old: list[str] = []
     metadata: Said = {}
-    for path, name in named:
-        there = paths.get(name)
-        if there is None:
+    for path, name in files:
+        present = paths.get(name)
+        if present is None:
             continue
-        digest = there if isinstance(there, bytes) else there()
+        digest = present if isinstance(present, bytes) else present()
         if digest == hashlib.sha256(read_bytes(path)).digest():
             continue
         clip = clips.get(name)

@@ -116,11 +116,11 @@ def plan_cut(
             f"{motion.counts.n_resolutions}",
             clip=clip.name,
         )
-    kept = None if joints is None else _find_joints(clip, joints)
-    cut = ClipCut(clip, start, stop, kept, resolution, ())
+    indices = None if joints is None else _find_joints(clip, joints)
+    cut = ClipCut(clip, start, stop, indices, resolution, ())
     groups = [tuple(range(info.counts.n_groups)) for info in clip.signals]
-    if kept is not None:
-        groups[0], mixed = groups_of(clip, kept)
+    if indices is not None:
+        groups[0], mixed = groups_of(clip, indices)
         if mixed is not None and is_recoded:
             return replace(cut, is_recoded=True)
         if mixed is not None:
@@ -137,9 +137,9 @@ def _find_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
     if not clip.signals[0].has_poses:
         raise OptionError("its motion signal is not made of joints", clip=clip.name)
     with error_context(clip=clip.name):
-        kept = frozenset(skeleton.find(joint) for joint in joint_list(joints))
-    others = (joint for index, joint in enumerate(skeleton.joints) if index not in kept)
-    return kept if any(joint.channels for joint in others) else None
+        indices = frozenset(skeleton.find(joint) for joint in joint_list(joints))
+    others = (joint for index, joint in enumerate(skeleton.joints) if index not in indices)
+    return indices if any(joint.channels for joint in others) else None
 
 
 def joint_of_column(skeleton: Skeleton) -> list[int]:

@@ -32,8 +32,8 @@ LONGEST = 255  # bytes of UTF-8 that a part of a path may have
 
 def fault_of(part: str) -> str:
     """Name the fault of a path's part that is invalid on some systems; "" for none."""
-    if odd := HIDDEN.search(part) or ODD.search(part):
-        return f"it has {odd[0]!a}"
+    if match := HIDDEN.search(part) or ODD.search(part):
+        return f"it has {match[0]!a}"
     if DEVICES.fullmatch(part):
         return "it names a device"
     if part != part.rstrip(" ."):
@@ -56,7 +56,7 @@ def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[st
     ``of``: the paths to check, None: all.
     """
     notes: dict[str, str] = {}
-    seen: dict[str, str] = {}
+    originals: dict[str, str] = {}
     for name in names:
         is_asked = of is None or name in of
         for part in PurePosixPath(name).parts if is_asked else ():
@@ -65,7 +65,7 @@ def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[st
                 notes.setdefault(name, f"{who} the name {part!r}: {fault}")
         path = name
         while path:
-            other = seen.setdefault(folded(path), path)
+            other = originals.setdefault(folded(path), path)
             if other != path:
                 if is_asked:
                     text = f"many disks take {path!r} for the same name as {other!r}"

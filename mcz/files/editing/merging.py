@@ -112,10 +112,10 @@ def add_files(
     Raises as ``merge``.
     """
     # Newly written content is unique: it cannot be read yet.
-    there: dict[Item, Callable[[], object]] = dict.fromkeys(
+    present: dict[Item, Callable[[], object]] = dict.fromkeys(
         items_in(transaction.writer.directory), object
     )
-    merging = Merger(rename, skip_identical, there)
+    merging = Merger(rename, skip_identical, present)
     merging.known |= {item: _content(before, item) for item in items_in(before)}
     merging.paths.update(transaction.paths)
 
@@ -162,14 +162,14 @@ class Merger:
         plan = plan_whole(file)
         for item in list(plan.changes):
             kind, name = item
-            there = self.known.get(item)
+            stored = self.known.get(item)
             of_skeleton = kind == ALIAS and file.alias_of(name).kind == SKELETON
-            may_skip = there is not None and (self.skip_identical or of_skeleton)
+            may_skip = stored is not None and (self.skip_identical or of_skeleton)
             new = ""
-            if there is not None and may_skip and there() == _content(file, item)():
+            if stored is not None and may_skip and stored() == _content(file, item)():
                 del plan.changes[item]  # aliases refer to the present one
                 new, result = "the same content", "present"
-            elif there is None and path_of(file, item) not in self.paths:
+            elif stored is None and path_of(file, item) not in self.paths:
                 result = "copied"
             elif self.rename:
                 new, result = self._free_name(file, item), "renamed"
@@ -250,14 +250,14 @@ class Part:
     result: str
 
 
-def encode_part(profile: Profile, asked: SourceEncoder) -> Part:
+def encode_part(profile: Profile, settings: SourceEncoder) -> Part:
     """The part of a file, within the limits of the target; raises as ``SourceEncoder.write``."""
-    encoder = SourceEncoder(asked.path, asked.name, asked.options, asked.encoding)
+    encoder = SourceEncoder(settings.path, settings.name, settings.options, settings.encoding)
     sink = io.BytesIO()
     transaction = WriteTransaction(sink, profile)
     result = encoder.write(transaction)
     transaction.finish()
-    digest = transaction.paths[asked.name]
+    digest = transaction.paths[settings.name]
     assert isinstance(digest, bytes)
     return Part(encoder, digest, sink.getvalue(), result)
 
@@ -339,7 +339,7 @@ def join_part(part: Part, transaction: WriteTransaction, clip: str) -> None:
 
 
 def request_parts(
-    entries: Iterable[SourceEncoder], transaction: WriteTransaction, seen: Content
+    entries: Iterable[SourceEncoder], transaction: WriteTransaction, content: Content
 ) -> Iterator[SourceEncoder | None]:
     """Yield the sources to encode ahead; None for one that may be stored already."""
     sent: set[bytes] = set()
@@ -350,7 +350,7 @@ def request_parts(
             yield None
             continue
         depends = wants_skeleton(entry.path)  # its values depend on the ASF next to it
-        is_there = not depends and (digest in seen or digest in sent)
+        is_there = not depends and (digest in content or digest in sent)
         if is_there or entry.name in transaction.paths:
             yield None
             continue
@@ -360,14 +360,14 @@ def request_parts(
 
 @contextmanager
 def encode_ahead(
-    entries: Sequence[SourceEncoder], transaction: WriteTransaction, seen: Content
+    entries: Sequence[SourceEncoder], transaction: WriteTransaction, content: Content
 ) -> Iterator[Iterator[SourceEncoder]]:
     """The entries in order, encoded ahead by other processes if worthwhile."""
     jobs = useful_jobs(len(entries), sum(size_of(entry.path) for entry in entries))
     if jobs == DEFAULT_JOBS or not only_own():
         yield iter(entries)
         return
-    asked, profile = request_parts(entries, transaction, seen), transaction.writer.profile
-    with answers(encode_part, asked, jobs, profile) as parts:
+    requests, profile = request_parts(entries, transaction, content), transaction.writer.profile
+    with answers(encode_part, requests, jobs, profile) as parts:
         pairs = zip(entries, parts, strict=True)
         yield (entry if answer is None else EncodedPart(entry, answer) for entry, answer in pairs)

@@ -138,9 +138,11 @@ def set_rate(
         raise OptionError(f"rate is {rate}; it must be above 0")
     with rewriting(target, output, force=force, progress=progress) as job:
         file = job.file
-        named = names is not None or where is not None
+        is_filtered = names is not None or where is not None
         clips = (
-            file.select_clips(names, where) if named else [c for c in file if c.frame_rate is None]
+            file.select_clips(names, where)
+            if is_filtered
+            else [c for c in file if c.frame_rate is None]
         )
         report, plan = Report(), plan_whole(file)
         for clip in clips:
@@ -302,11 +304,11 @@ def _chosen_columns(
     own = next((name for name in NAMES if name in head), None) if match is None else None
     used = _match_columns(match or "")
     columns = [name for name in head if name != own]
-    odd = [name for name in columns if not _is_key(name) and name not in used]
-    if odd:
+    unknown = [name for name in columns if not _is_key(name) and name not in used]
+    if unknown:
         raise OptionError(
-            f"{suggest_names(odd, None)}: not metadata keys; choose columns with take, such as "
-            f"description={odd[0]}",
+            f"{suggest_names(unknown, None)}: not metadata keys; choose columns with take, such as "
+            f"description={unknown[0]}",
             path=path,
         )
     return {name: name for name in columns if _is_key(name)}

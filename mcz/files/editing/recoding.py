@@ -117,9 +117,9 @@ def edit(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Edit
     before = clip.motion()
     for info, signal in zip(clip.signals, before.signals, strict=True):
         clip.check_hash(info, signal.stored, signal.mask)
-    given = _check_values(clip, columns, values)
-    signal = _edit_signal(clip, before, columns, given, on_grid)
-    return Edited(index, replace(before, signals=(signal, *before.signals[1:])), given)
+    checked = _check_values(clip, columns, values)
+    signal = _edit_signal(clip, before, columns, checked, on_grid)
+    return Edited(index, replace(before, signals=(signal, *before.signals[1:])), checked)
 
 
 def _check_editable(clip: Clip, joint: int | str) -> int:
@@ -153,28 +153,28 @@ def _own_groups(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ..
 
 def _check_values(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDArray[np.float64]:
     try:
-        given = np.asarray(values, np.float64)
+        array = np.asarray(values, np.float64)
     except (TypeError, ValueError):
         raise MotionError("the new values are not numbers", clip=clip.name) from None
     shape = clip.n_frames * clip.signals[0].layout.samples_per_frame, len(columns)
-    if given.ndim == 1 and shape[1] == 1:
-        given = given[:, None]
-    if given.shape != shape:
-        raise MotionError(f"expected values of {shape}, not {given.shape}", clip=clip.name)
-    return given
+    if array.ndim == 1 and shape[1] == 1:
+        array = array[:, None]
+    if array.shape != shape:
+        raise MotionError(f"expected values of {shape}, not {array.shape}", clip=clip.name)
+    return array
 
 
 def _edit_signal(
-    clip: Clip, before: Motion, columns: Sequence[int], given: NDArray[np.float64], on_grid: bool
+    clip: Clip, before: Motion, columns: Sequence[int], values: NDArray[np.float64], on_grid: bool
 ) -> Signal:
     """The motion signal with the new values; NaN is invalid and keeps the old value."""
     old = before.signals[0]
-    valid = ~np.isnan(given)
+    valid = ~np.isnan(values)
     was_valid = np.ones(old.values.shape, np.bool_) if old.mask is None else old.mask
     differs = valid != was_valid[:, columns]
     if before.source is not None and differs.any():
         row, at = np.argwhere(differs)[0].tolist()
-        now = "NaN" if not valid[row, at] else repr(float(given[row, at]))
+        now = "NaN" if not valid[row, at] else repr(float(values[row, at]))
         raise MotionError(
             f"frame {row // old.samples_per_frame} of "
             f"{clip.skeleton.channel_addresses()[columns[at]]} is {now}; its source file says "
@@ -183,12 +183,12 @@ def _edit_signal(
         )
     new, mask = old.values.copy(), was_valid.copy()
     if new.dtype == np.int64:
-        given = np.where(valid, given, 0.0)
-        whole = np.rint(given)
-        if (np.abs(whole) > MAX_INTEGER).any() or (not on_grid and (whole != given).any()):
+        values = np.where(valid, values, 0.0)
+        whole = np.rint(values)
+        if (np.abs(whole) > MAX_INTEGER).any() or (not on_grid and (whole != values).any()):
             raise MotionError("the clip holds only integers up to 2^53", clip=clip.name)
-        given = whole
-    new[:, columns] = np.where(valid, given, new[:, columns])
+        values = whole
+    new[:, columns] = np.where(valid, values, new[:, columns])
     mask[:, columns] = valid
     signal = replace(old, values=new, mask=None if mask.all() else mask)
     if clip.signals[0].codec.domain == "values" or new.dtype == np.int64:
@@ -208,20 +208,20 @@ def _place_on_grids(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> S
         if not block.any() or (grid.is_text and not on_grid):
             continue
         row, at = np.argwhere(block)[0].tolist()
-        what = (
+        label = (
             f"clip {clip.name!r}: frame {(row + rows.start) // signal.samples_per_frame} of "
             f"{clip.skeleton.channel_addresses()[columns[at]]}: its grid {grid.kind.name} does not "
             f"hold {values[row + rows.start, columns[at]]!r}"
         )
         if not on_grid:
-            raise MotionError(f"{what}; use on_grid to round to the nearest value")
+            raise MotionError(f"{label}; use on_grid to round to the nearest value")
         placed = ordinals[rows][:, columns]
         nearest = grid.values(placed)
-        given = values[rows][:, columns]
-        beyond = (np.abs(placed) >= grid.limit) | ~np.isfinite(nearest) | ~np.isfinite(given)
+        present = values[rows][:, columns]
+        beyond = (np.abs(placed) >= grid.limit) | ~np.isfinite(nearest) | ~np.isfinite(present)
         if (beyond & block).any():
-            raise MotionError(f"{what}, nor a value near it")
-        values[rows, columns] = np.where(block, nearest, given)
+            raise MotionError(f"{label}, nor a value near it")
+        values[rows, columns] = np.where(block, nearest, present)
     return replace(signal, values=values)
 
 
@@ -346,11 +346,11 @@ def check_recodable(clip: Clip, *, whole: bool = False) -> None:
 def settings_of(clip: Clip) -> Settings:
     """The settings of a clip that differ from the defaults."""
     codec = clip.signals[0].codec
-    usual = codec.options({})
+    defaults = codec.options({})
     settings = recorded_options(codec, clip.quality or {})
     if codec.promise:
         settings.pop("preset", None)  # the setting of the dial is its result
-    return {name: value for name, value in settings.items() if value != usual[name]}
+    return {name: value for name, value in settings.items() if value != defaults[name]}
 
 
 def with_own_source(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:

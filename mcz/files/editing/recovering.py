@@ -165,23 +165,23 @@ def _examine_set(source: ByteSource, one: _RecoverySet) -> Examined:
     """Find the data blocks; missing ones are bad."""
     shape = one.shape
     table = _read_table(one)
-    there: dict[int, tuple[int, ...]] = {}
+    present: dict[int, tuple[int, ...]] = {}
     shifts = [0, *one.shifts]
     hint = 0
     for block in range(shape.n_blocks):
         pieces = shape.pieces(block)
         block_hash = None if table is None else table[HASH * block : HASH * (block + 1)]
         order = dict.fromkeys([hint, *shifts])
-        for tried in product(order, repeat=len(pieces)):
-            data = _read(source, pieces, tried)
+        for candidate in product(order, repeat=len(pieces)):
+            data = _read(source, pieces, candidate)
             if data is None:
                 continue
             padded = data.ljust(shape.block_size, b"\0")
             if block_hash is None or short_hash(padded) == block_hash:
-                there[block] = tried
-                hint = tried[0]
+                present[block] = candidate
+                hint = candidate[0]
                 break
-    return Examined(one, there)
+    return Examined(one, present)
 
 
 def _read(
@@ -222,14 +222,14 @@ class Restorer:
     def __init__(self, source: ByteSource, out: BinaryIO, step: Step | None) -> None:
         self.source, self.out, self.step = source, out, step
 
-    def restore(self, one: _RecoverySet, there: dict[int, tuple[int, ...]]) -> None:
+    def restore(self, one: _RecoverySet, present: dict[int, tuple[int, ...]]) -> None:
         """Write the range of one RECV, and the RECV; raises FormatError for a wrong result."""
         shape = one.shape
-        for block, shifts in there.items():
+        for block, shifts in present.items():
             data = _read(self.source, shape.pieces(block), shifts)
             assert data is not None
             self._write(shape, block, data)
-        self._write_lost(one, there)
+        self._write_lost(one, present)
         self._write_recv(one)
 
     def _write(self, shape: Shape, block: int, data: bytes, first: int = 0) -> None:
@@ -242,14 +242,16 @@ class Restorer:
                 self.out.write(data[begin - first : end - first])
             at += size
 
-    def _write_lost(self, one: _RecoverySet, there: dict[int, tuple[int, ...]]) -> None:
+    def _write_lost(self, one: _RecoverySet, present: dict[int, tuple[int, ...]]) -> None:
         """Write the bad blocks, of large ones some columns at a time."""
         shape = one.shape
-        lost = [block for block in range(shape.n_blocks) if block not in there]
+        lost = [block for block in range(shape.n_blocks) if block not in present]
         rows = sorted(one.blocks)[: len(lost)]
 
         def read(block: int) -> bytes:
-            data = _read(self.source, shape.pieces(block), there[block]) if block in there else b""
+            data = (
+                _read(self.source, shape.pieces(block), present[block]) if block in present else b""
+            )
             return (data or b"").ljust(shape.block_size, b"\0")
 
         for start, whole in compute_lanes(shape, read, self.step) if lost else ():
@@ -291,9 +293,9 @@ def examine(source: ByteSource) -> tuple[Recovery, list[Examined]]:
     """Examine a file by its recovery data: bad blocks, and their places."""
     starts, chain, at = recovery_sets(source), list[Examined](), 0
     while at in starts:
-        tried = map(partial(_examine_set, source), starts[at])
-        fallback = next(tried)
-        every = chain_from((fallback,), tried)
+        outcomes = map(partial(_examine_set, source), starts[at])
+        fallback = next(outcomes)
+        every = chain_from((fallback,), outcomes)
         chain.append(next((one for one in every if one.is_possible), fallback))
         at = chain[-1].set.shape.stop
     recovery = Recovery(possible=all(one.is_possible for one in chain))

@@ -69,13 +69,13 @@ def delete_clips(
     """
     with rewriting(target, output, force=force, progress=progress) as job:
         file = job.file
-        named = [_find_item(file, name) for name in ([names] if isinstance(names, str) else names)]
+        items = [_find_item(file, name) for name in ([names] if isinstance(names, str) else names)]
         if where is not None:
-            named += [(CLIP, clip.name) for clip in file.find(where)]
-        if not named:
+            items += [(CLIP, clip.name) for clip in file.find(where)]
+        if not items:
             reason = "name clips or give where" if where is None else f"no clip matches {where!r}"
             raise OptionError(f"nothing to delete; {reason}", path=file.name)
-        gone = dict.fromkeys(named)
+        gone = dict.fromkeys(items)
         others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in gone]
         missed = [alias for _, alias in others if (ALIAS, alias) not in gone]
         if missed and not aliases:
@@ -87,11 +87,13 @@ def delete_clips(
             )
         gone |= dict.fromkeys(others)
         plan = _plan_without(file, gone)
-        what = {item: item[0] for kind in KINDS for item in gone if item[0] == kind}
+        kinds = {item: item[0] for kind in KINDS for item in gone if item[0] == kind}
         for item in items_in(file):
             if item not in plan.changes:  # with the clips that had the skeleton
-                what.setdefault(item, "the file of a skeleton that no other clip has")
-        report = Report([Outcome(name, "deleted", 0, reason) for (_, name), reason in what.items()])
+                kinds.setdefault(item, "the file of a skeleton that no other clip has")
+        report = Report(
+            [Outcome(name, "deleted", 0, reason) for (_, name), reason in kinds.items()]
+        )
         return job.write(plan, report)
 
 
@@ -278,8 +280,8 @@ def _group_clips(file: File, by: str, rest: str | None) -> dict[str, list[str]]:
             without.append(clip.name)
         else:
             groups.setdefault(_text(value), []).append(clip.name)
-    kept = used_by(file, file.clips)
-    others = [key for key in file.container.directory.shared if key not in kept]
+    needed = used_by(file, file.clips)
+    others = [key for key in file.container.directory.shared if key not in needed]
     if rest is not None:
         groups.setdefault(rest, []).extend(without)
     elif without or file.attachments or others:
@@ -308,37 +310,37 @@ def _plan_part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
     plan = Plan(dict.fromkeys(((CLIP, name) for name in names), UNCHANGED), shared)
     if with_rest:
         plan.changes |= dict.fromkeys(((ATTACHMENT, name) for name in file.attachments), UNCHANGED)
-    kept = {*plan.changes}
-    kept |= {(SKELETON, id_.hex()) for kind, id_ in shared if kind == ChunkType.SKEL}
-    others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in kept]
+    items = {*plan.changes}
+    items |= {(SKELETON, id_.hex()) for kind, id_ in shared if kind == ChunkType.SKEL}
+    others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in items]
     plan.changes |= dict.fromkeys(others, UNCHANGED)
     return plan
 
 
 def used_by(file: File, names: Iterable[str]) -> set[Shared]:
     """The skeletons with their bases, the templates and the models that these clips need."""
-    container, used = file.container, set[Shared]()
+    container, items = file.container, set[Shared]()
     has_models = bool(container.directory.ids(ChunkType.MODL))
     for name in names:
         row = container.directory.clips[name]
         source = container.clip_head(row).source
         if source is not None:
-            used.add((ChunkType.SRCE, source.template))
-        if (ChunkType.SKEL, row.skeleton) not in used:
-            used |= used_by_skeleton(container, row.skeleton)
+            items.add((ChunkType.SRCE, source.template))
+        if (ChunkType.SKEL, row.skeleton) not in items:
+            items |= used_by_skeleton(container, row.skeleton)
         for signal in file.clips[name].signals if has_models else ():
-            used |= {(ChunkType.MODL, id_) for id_ in models_used(signal)}
-    return used
+            items |= {(ChunkType.MODL, id_) for id_ in models_used(signal)}
+    return items
 
 
 def used_by_skeleton(container: Container, id_: bytes) -> set[Shared]:
     """A skeleton, its bases, and the templates of their own files."""
-    used: set[Shared] = set()
+    items: set[Shared] = set()
     next_id: bytes | None = id_
-    while next_id and (ChunkType.SKEL, next_id) not in used:
+    while next_id and (ChunkType.SKEL, next_id) not in items:
         fields = container.skeleton_fields(next_id)
-        used.add((ChunkType.SKEL, next_id))
+        items.add((ChunkType.SKEL, next_id))
         if fields.source:
-            used.add((ChunkType.SRCE, bytes(fields.source.template)))
+            items.add((ChunkType.SRCE, bytes(fields.source.template)))
         next_id = fields.base
-    return used
+    return items

@@ -235,17 +235,17 @@ def _indexed_names(container: Container) -> dict[int, str]:
     """The names, in a valid index, of the parts at each offset; "" for one that is not lost."""
     names: dict[int, str] = {}
     with suppress(FormatError):
-        listed = Container(container.source).directory
-        for (kind, id_), chunk in listed.shared.items():
+        directory = Container(container.source).directory
+        for (kind, id_), chunk in directory.shared.items():
             names[chunk.offset] = f"{kind.decode()} {id_.hex()}"
-        for name, clip in listed.clips.items():
+        for name, clip in directory.clips.items():
             names[clip.clip.offset] = f"clip {name!r}: all of it"
             inside = [row.chunk() for row in clip.segments if not row.packet]
             names |= {one.offset: "" for one in (*inside, clip.cend) if one is not None}
             for one in clip.ancillary:
                 text = f"clip {name!r}: its {one.type.decode()}"
                 names[one.offset] = "" if one.type in REPORTED else text
-        for name, row in listed.attachments.items():
+        for name, row in directory.attachments.items():
             names |= {part.offset: f"attachment {name!r}" for part in row.parts}
     return names | {len(SIGNATURE): ""}  # HEAD
 
@@ -300,19 +300,19 @@ def _plan_runs(clip: Clip) -> Iterator[WholeRun]:
         parts = whole_parts(clip)
         if not parts and stated_frames(clip) == clip.n_frames == 0:
             parts = [((0, 0), tuple(range(len(clip.signals))))]  # no frame of it can be lost
-        for run, kept in parts:
-            one = clip if len(kept) == len(clip.signals) else SomeSignals(clip, kept)
+        for run, signals in parts:
+            one = clip if len(signals) == len(clip.signals) else SomeSignals(clip, signals)
             cut = plan_cut(one, run, None, 0)
             yield WholeRun(*(getattr(cut, one.name) for one in fields(ClipCut)))
 
 
 def _list_losses(clip: Clip, runs: list[WholeRun], problems: list[Problem]) -> Iterator[str]:
-    stated = stated_frames(clip)
+    counts = stated_frames(clip)
     if not runs:
-        yield f"clip {clip.name!r}: {stated:,} of {stated:,} frames: {problems[0].message}"
+        yield f"clip {clip.name!r}: {counts:,} of {counts:,} frames: {problems[0].message}"
         return
     names = [info.name for info in clip.signals]
-    missing = dict.fromkeys(names, stated)
+    missing = dict.fromkeys(names, counts)
     for run in runs:
         for info in run.clip.signals:
             missing[info.name] -= run.n_frames
@@ -321,7 +321,7 @@ def _list_losses(clip: Clip, runs: list[WholeRun], problems: list[Problem]) -> I
     for name, number in missing.items():
         if number:
             signal = f", signal {name!r}" if name else ""
-            yield f"clip {clip.name!r}{signal}: {number:,} of {stated:,} frames"
+            yield f"clip {clip.name!r}{signal}: {number:,} of {counts:,} frames"
     if any(missing.values()):
         return
     if clip.container.directory.clips[clip.name].cend is None:
@@ -356,13 +356,13 @@ def whole_parts(clip: Clip) -> list[tuple[Run, tuple[int, ...]]]:
     edges = sorted({edge for signal_runs in runs for run in signal_runs for edge in run})
     parts: list[tuple[Run, tuple[int, ...]]] = []
     for start, stop in pairwise(edges):
-        kept = tuple(
+        signals = tuple(
             index
             for index, signal_runs in enumerate(runs)
             if any(first <= start and stop <= last for first, last in signal_runs)
         )
-        if parts and parts[-1][1] == kept and parts[-1][0][1] == start:
-            parts[-1] = (parts[-1][0][0], stop), kept
-        elif kept:
-            parts.append(((start, stop), kept))
+        if parts and parts[-1][1] == signals and parts[-1][0][1] == start:
+            parts[-1] = (parts[-1][0][0], stop), signals
+        elif signals:
+            parts.append(((start, stop), signals))
     return parts

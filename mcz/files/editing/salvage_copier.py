@@ -69,9 +69,9 @@ def about_clip(name: str, problem: Problem) -> str:
 class SomeSignals(Clip):
     """The rest of a clip that has lost some signals, and so its source."""
 
-    def __init__(self, clip: Clip, kept: tuple[int, ...]) -> None:
+    def __init__(self, clip: Clip, numbers: tuple[int, ...]) -> None:
         super().__init__(clip.container, clip.container.directory.clips[clip.name])
-        self.whole, self.kept = clip, kept
+        self.whole, self.kept = clip, numbers
 
     @property
     def signals(self) -> tuple[SignalInfo, ...]:
@@ -144,10 +144,10 @@ class Repairer(Copier):
     def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> None:
         for cut in cuts:
             if degree := self._degree_of(cut):
-                what = "chunks that belong to it, which break a rule"
+                noun = "chunks that belong to it, which break a rule"
                 if degree == NO_PART:
-                    what = "all of it, which breaks a rule"
-                self.repair.lost.append(f"clip {self.name_of(cut)!r}: {what}")
+                    noun = "all of it, which breaks a rule"
+                self.repair.lost.append(f"clip {self.name_of(cut)!r}: {noun}")
         super().run([cut for cut in cuts if self._degree_of(cut) < NO_PART], alone=alone)
 
     def record_result(self, cut: ClipCut) -> None:
@@ -237,8 +237,8 @@ class Repairer(Copier):
         is_renamed = isinstance(cut, WholeRun) and cut.name != cut.clip.name
         if is_renamed and new.source and new.source.path:
             path = PurePosixPath(new.source.path)
-            named = path.with_name(f"{path.stem}.{cut.start}-{cut.stop}{path.suffix}")
-            new.source = replace(new.source, path=str(named))
+            target = path.with_name(f"{path.stem}.{cut.start}-{cut.stop}{path.suffix}")
+            new.source = replace(new.source, path=str(target))
         return hashes
 
     def _without_source(

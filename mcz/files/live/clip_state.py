@@ -112,7 +112,7 @@ def begin_clip(
     skeleton = container.skeleton(row.skeleton)
     rate = Fraction(row.rate_numerator, row.rate_denominator) if row.rate_numerator else None
     motion = fields.signals[0]
-    shown = range(motion.skip, motion.skip + fields.n_frames)
+    visible = range(motion.skip, motion.skip + fields.n_frames)
     motion.skip = motion.spare = 0
     nothing = replace(row, n_frames=0, segments=[])  # its later parts are unknown
     info = read_signal(container, nothing, fields, 0, skeleton, rate)
@@ -121,7 +121,7 @@ def begin_clip(
         return None
     is_open = bool(fields.flags & payloads.OPEN_CLIP)
     clip = LiveClip(row.name, skeleton, rate, info.codec.name)
-    return ClipState(clip, info, None if is_open else shown, len(fields.signals))
+    return ClipState(clip, info, None if is_open else visible, len(fields.signals))
 
 
 def opening(head: bytes, shared: Shared, fields: payloads.Clip) -> bytes:
@@ -137,10 +137,10 @@ class ClipState:
     """
 
     def __init__(
-        self, clip: LiveClip, info: SignalInfo, shown: range | None, n_signals: int
+        self, clip: LiveClip, info: SignalInfo, visible: range | None, n_signals: int
     ) -> None:
         assert info.codec.follow is not None
-        self.clip, self.info, self.shown, self.n_signals = clip, info, shown, n_signals
+        self.clip, self.info, self.shown, self.n_signals = clip, info, visible, n_signals
         self._where = f"clip {clip.name!r}"
         check_known_answer(info.codec)
         self.decoder: LiveDecoder = info.codec.follow(info.header, info.layout)

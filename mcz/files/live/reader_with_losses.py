@@ -119,10 +119,10 @@ class FramesWithLosses:
             self._head = event.data
         elif kind in (ChunkType.SKEL, ChunkType.MODL):
             self._shared.setdefault((kind, chunk_id(kind, event.payload)), event.data)
-            kept = sum(map(len, self._shared.values()))
+            n_kept = sum(map(len, self._shared.values()))
             check(
                 "SKEL and MODL: bytes",
-                kept,
+                n_kept,
                 2 * max(self._parser.profile.model_bytes, BASE.model_bytes),
             )
         elif kind == ChunkType.CLIP:
@@ -178,8 +178,8 @@ class FramesWithLosses:
             self._course = course
             self._fault(str(error))
             return
-        shown, frames = course.followed.shown, course.frames
-        stop = fields.n_frames + (0 if shown is None else shown.start)
+        visible, frames = course.followed.shown, course.frames
+        stop = fields.n_frames + (0 if visible is None else visible.start)
         if frames.due is not None:
             yield from frames.reach(stop)
         yield from frames.end()
@@ -212,11 +212,11 @@ class FramesWithLosses:
             elif header.signal == 0:
                 yield from self._frame(course, header, packet.kind, packet.body)  # PACK-12
             return
-        due = self._parser.frame_due
-        if due is None and self._least is not None:
-            due = self._least + packet.sequence
-        if due is not None:
-            yield from course.frames.reach(min(due, MAX_COUNT))
+        frame = self._parser.frame_due
+        if frame is None and self._least is not None:
+            frame = self._least + packet.sequence
+        if frame is not None:
+            yield from course.frames.reach(min(frame, MAX_COUNT))
 
     def _segment(self, course: _ClipCourse, payload: bytes) -> Iterator[LiveFrame]:
         try:
@@ -283,13 +283,13 @@ class Concealer:
         self,
         n_channels: int,
         lost: Lost,
-        shown: range | None,
+        visible: range | None,
         spend: Callable[[int], bool],
         *,
         join: bool = False,
     ) -> None:
-        self._first = 0 if shown is None else shown.start
-        self._stop = None if shown is None else shown.stop
+        self._first = 0 if visible is None else visible.start
+        self._stop = None if visible is None else visible.stop
         self.due: int | None = None if join else self._first
         self._lost, self._spend = lost, spend
         self._nothing = np.full(n_channels, np.nan), np.zeros(n_channels, np.bool_)
@@ -304,11 +304,11 @@ class Concealer:
         if number < self.due or (self._stop is not None and number >= self._stop):
             return
         valid = np.ones(values.shape, np.bool_) if mask is None else mask
-        shown = values if mask is None else np.where(valid, values, np.nan)
+        row = values if mask is None else np.where(valid, values, np.nan)
         if self._owed:
-            yield from self._between(shown, valid)
-        self.due, self._last = number + 1, (shown, valid)
-        yield LiveFrame(number - self._first, shown, valid)  # LIVE-02
+            yield from self._between(row, valid)
+        self.due, self._last = number + 1, (row, valid)
+        yield LiveFrame(number - self._first, row, valid)  # LIVE-02
 
     def reach(self, number: int) -> Iterator[LiveFrame]:
         """Note that no frame before ``number`` will come."""

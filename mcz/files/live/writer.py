@@ -206,8 +206,8 @@ class LiveWriter:
             row = self._placed(row).reshape(-1)
         known = ~np.isnan(row)
         valid = None if known.all() else known
-        given = row if valid is None else np.where(valid, row, 0.0)
-        stream, fresh = self._encoder.push(given, valid)
+        finite = row if valid is None else np.where(valid, row, 0.0)
+        stream, fresh = self._encoder.push(finite, valid)
         try:
             self._write(stream, fresh, valid)
         except LimitError:
@@ -281,12 +281,12 @@ class LiveWriter:
 
     def _repeats(self) -> bool:
         """True if the fresh frame that is due follows repeated headers."""
-        asked = self.traffic.asked
+        interval = self.traffic.asked
         if self._repeat is not None:
             return self._repeat > 0 and (self._n_fresh - 1) % self._repeat == 0
-        if asked is None or not self._rate:
+        if interval is None or not self._rate:
             return True
-        spent = 125 * asked * float((self.n_frames - self._repeated_at) / self._rate)
+        spent = 125 * interval * float((self.n_frames - self._repeated_at) / self._rate)
         return len(self._opening) <= REPEATED_SHARE * spent
 
     def heartbeat(self) -> None:
@@ -373,8 +373,8 @@ class _Outlet:
         self._traffic.total += self.size
         while self._parts:
             data = b"".join(self._parts)
-            taken = self._sink.write(data)  # a raw stream may write only a part
-            left = b"" if taken is None else data[taken:]
+            n_written = self._sink.write(data)  # a raw stream may write only a part
+            left = b"" if n_written is None else data[n_written:]
             self._parts = [left] if left else []
         flush = getattr(self._sink, "flush", None)
         if flush is not None:
@@ -391,10 +391,10 @@ def defer_sigint() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread() or not callable(handler):
         yield
         return
-    seen = []
+    signals = []
 
     def wait(number: int, frame: object) -> None:
-        seen.append(number)
+        signals.append(number)
         signal.signal(signal.SIGINT, handler)
 
     signal.signal(signal.SIGINT, wait)
@@ -402,5 +402,5 @@ def defer_sigint() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, handler)
-        if seen:
+        if signals:
             signal.raise_signal(signal.SIGINT)

@@ -307,8 +307,8 @@ class Clip(StoredClip):
         frames if the codec stores some apart (qbc: its marks); otherwise they are its coarsest
         resolution. Raises OptionError for a codec without either.
         """
-        shown = self.read_preview(joints)
-        return FrameValues(shown.frames, shown.masked())
+        preview = self.read_preview(joints)
+        return FrameValues(preview.frames, preview.masked())
 
     def read_preview(self, joints: Joints = None) -> Preview:
         """``preview`` with a separate mask, and the distance of its frames."""

@@ -61,8 +61,8 @@ def _rate_note(clip: Clip, is_file: bool) -> str | None:
     stated = _stated_rate(clip, rate, is_file=is_file)
     if stated is None:
         return None
-    what = f"{float(stated):g} frames a second" if stated else "no frame rate"
-    return f"its source states {what}, the clip has {float(rate):g}"
+    label = f"{float(stated):g} frames a second" if stated else "no frame rate"
+    return f"its source states {label}, the clip has {float(rate):g}"
 
 
 def _start_note(clip: Clip, start: int, is_file: bool) -> str | None:
@@ -155,9 +155,9 @@ def differences(a: Motion, b: Motion) -> list[Difference]:
     """The differences of ``b`` from ``a`` other than of values; raises FormatError on bad bytes."""
     facts, things = (_single_values(a), _single_values(b)), (_collections(a), _collections(b))
     result = [
-        Difference(what, facts[0][what], facts[1][what])
-        for what in facts[0]
-        if facts[0][what] != facts[1][what]
+        Difference(fact, facts[0][fact], facts[1][fact])
+        for fact in facts[0]
+        if facts[0][fact] != facts[1][fact]
     ]
     if facts[0]["first frame"] == facts[1]["first frame"]:
         result += _time_differences(
@@ -170,9 +170,9 @@ def differences(a: Motion, b: Motion) -> list[Difference]:
         groups = other["groups of parameters"]
         both = {key: value for key, value in one["parameters"].items() if key[0] in groups}
         one["parameters"] = {f"{group}:{name}": value for (group, name), value in both.items()}
-    result += filter(None, (_compare(what, things[0][what], things[1][what]) for what in things[0]))
-    if not result and (what := _source_difference(a, b)):
-        result.append(Difference(what, None, None))
+    result += filter(None, (_compare(fact, things[0][fact], things[1][fact]) for fact in things[0]))
+    if not result and (fact := _source_difference(a, b)):
+        result.append(Difference(fact, None, None))
     return result
 
 
@@ -185,21 +185,21 @@ def _time_differences(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[D
     one, other = a.timeline, b.timeline
     if one is None or other is None or not is_rate_same or len(one.times) != len(other.times):
         return
-    off = np.abs(one.regular_times - other.regular_times)
+    errors = np.abs(one.regular_times - other.regular_times)
     allowed = one.rounding + other.rounding + TOLERANCE
-    if (off[:1] > allowed).any():
+    if (errors[:1] > allowed).any():
         first, others = float(one.regular_times[0]), float(other.regular_times[0])
         yield Difference("time of the first frame in s", first, others)
-    elif (off > allowed).any():
+    elif (errors > allowed).any():
         yield Difference("times", None, None)
 
 
-def _compare(what: str, a: Params, b: Params) -> Difference | None:
+def _compare(fact: str, a: Params, b: Params) -> Difference | None:
     only_a, only_b = (tuple(name for name in x if name not in y) for x, y in ((a, b), (b, a)))
     changed = tuple(name for name in a if name in b and repr(a[name]) != repr(b[name]))
     if not (only_a or only_b or changed):
         return None
-    return Difference(what, len(a), len(b), only_a, only_b, changed)
+    return Difference(fact, len(a), len(b), only_a, only_b, changed)
 
 
 def _single_values(motion: Motion) -> dict[str, str | int | float | None]:
@@ -240,12 +240,12 @@ def _collections(motion: Motion) -> dict[str, dict[Any, Any]]:
 
 def _events(events: Iterable[Event]) -> Iterator[tuple[str, Event]]:
     """Events by words and time; the second of equal texts gets #1."""
-    seen: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for event in events:
         words = " ".join(filter(None, (event.subject, event.context, event.label)))
         text = f"{words} at {event.time:.6g} s"
-        yield f"{text} #{seen[text]}" if text in seen else text, event
-        seen[text] += 1
+        yield f"{text} #{counts[text]}" if text in counts else text, event
+        counts[text] += 1
 
 
 def _parameters(motion: Motion) -> dict[tuple[str, str], Any]:

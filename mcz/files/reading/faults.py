@@ -151,8 +151,8 @@ class _Check:
         elif index is not None and not self._has_lost:
             try:
                 limit = index_limit(size)
-                listed = read_indexes(self._source.read, index.offset, index.size, limit)
-                faults = self._places.differences(directory_of(listed))
+                directory = read_indexes(self._source.read, index.offset, index.size, limit)
+                faults = self._places.differences(directory_of(directory))
             except FormatError as error:
                 faults = [str(error)]
             for text in faults:
@@ -202,22 +202,24 @@ class _Places:
         elif chunk.flags and chunk.type != ChunkType.INDX and clip.cend is not None:
             clip.ancillary.append(chunk)
 
-    def differences(self, listed: Directory) -> list[str]:
+    def differences(self, directory: Directory) -> list[str]:
         """The faults of an index, in words; empty if it is right."""
         faults = []
-        if listed.head != self.head:
+        if directory.head != self.head:
             faults.append("its copy of HEAD differs from HEAD")
-        if list(listed.shared.items()) != list(self.shared.items()):
+        if list(directory.shared.items()) != list(self.shared.items()):
             faults.append("it lists other skeletons, models or sources than the file has")
-        if [part for row in listed.attachments.values() for part in row.parts] != self.attachments:
+        if [
+            part for row in directory.attachments.values() for part in row.parts
+        ] != self.attachments:
             faults.append("it lists other attachments than the file has")
-        if self.n_aliases != len(listed.aliases):
+        if self.n_aliases != len(directory.aliases):
             faults.append(
-                f"it lists {len(listed.aliases)} aliases, but the file has {self.n_aliases}"
+                f"it lists {len(directory.aliases)} aliases, but the file has {self.n_aliases}"
             )
-        if len(self.clips) != len(listed.clips):
-            return [*faults, f"it lists {len(listed.clips)} clips, there are {len(self.clips)}"]
-        pairs = zip(self.clips, listed.clips.values(), strict=True)
+        if len(self.clips) != len(directory.clips):
+            return [*faults, f"it lists {len(directory.clips)} clips, there are {len(self.clips)}"]
+        pairs = zip(self.clips, directory.clips.values(), strict=True)
         moved = (row.name for places, row in pairs if places != places_of(row))
         return faults + [f"clip {name!r} does not lie where it says" for name in moved]
 
@@ -265,8 +267,8 @@ def quick_check(
         stack.enter_context(error_context(path=source.name))
         if source.grows():
             source = stack.enter_context(open(target)).container.source
-        seen = check_checksums(source, progress)
-        return seen, [Problem(at, heading(source, at), text) for at, text in seen.faults]
+        scanned = check_checksums(source, progress)
+        return scanned, [Problem(at, heading(source, at), text) for at, text in scanned.faults]
 
 
 Row = tuple[str, str, list[Problem]]  # kind, name and faults of a part of a file

@@ -122,13 +122,15 @@ def _restore(
 def _lost_ids(container: Container) -> set[bytes]:
     """The ids of the skeletons that clips, skeletons and aliases name and the file has not."""
     directory = container.directory
-    named = {row.skeleton for row in directory.clips.values()}
-    named |= {target for of, target in directory.aliases.values() if of == payloads.OF_SKELETON}
+    referenced = {row.skeleton for row in directory.clips.values()}
+    referenced |= {
+        target for of, target in directory.aliases.values() if of == payloads.OF_SKELETON
+    }
     for id_ in directory.ids(ChunkType.SKEL):
         with suppress(MczError):
             base = container.skeleton_fields(id_).base
-            named |= {base} if base else set()
-    return {id_ for id_ in named if (ChunkType.SKEL, id_) not in directory.shared}
+            referenced |= {base} if base else set()
+    return {id_ for id_ in referenced if (ChunkType.SKEL, id_) not in directory.shared}
 
 
 def _asf_skels(container: Container, template: bytes, lost: set[bytes]) -> Iterator[bytes]:
@@ -205,14 +207,14 @@ def _bases(container: Container) -> Iterator[Skeleton | None]:
 
 def _offset_ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:
     """The joints, whose positions add to the offset or replace it, of roots and of others."""
-    moving = [any(c.kind in POSITION_KINDS for c in joint.channels) for joint in joints]
+    has_position = [any(c.kind in POSITION_KINDS for c in joint.channels) for joint in joints]
     yield joints
     for of_roots, of_others in product((True, False), repeat=2):
         yield tuple(
             replace(joint, adds_to_offset=of_roots if joint.parent < 0 else of_others)
             if moves
             else joint
-            for joint, moves in zip(joints, moving, strict=True)
+            for joint, moves in zip(joints, has_position, strict=True)
         )
 
 

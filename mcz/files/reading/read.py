@@ -67,10 +67,10 @@ def read(
             raise OptionError(
                 "the file has a skeleton but no motion; read it with mcz.read_skeleton", path=path
             )
-        taken = read_motion(path, skeleton, data=data)
-        if taken.remark:
-            warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
-        motion = taken.motion
+        result = read_motion(path, skeleton, data=data)
+        if result.remark:
+            warnings.warn(f"{path}: {result.remark}", SkeletonWarning, stacklevel=2)
+        motion = result.motion
     options = SourceOptions(rate=rate, unit=unit, up=up, arrays=arrays, model=model)
     return options.applied_to(motion)
 
@@ -107,7 +107,7 @@ class ReadMotion:
 
 def read_motion(
     path: Path,
-    given: Given = None,
+    skeleton_file: Given = None,
     unit: str | None = None,
     data: bytes | None = None,
     *,
@@ -115,16 +115,16 @@ def read_motion(
 ) -> ReadMotion:
     """Read the motion file ``path``, whose bytes are ``data`` if already read.
 
-    ``given`` is the skeleton of a format that needs one: an object, the path of a file, "none" for
-    none, or None to search. The metadata state how one was found. Raises SourceError if no
-    skeleton can be chosen, and as ``read_source``; with ``flat`` a file with several possible
-    skeletons nearby is read without one, and the metadata mention it.
+    ``skeleton_file`` is the skeleton of a format that needs one: an object, the path of a file,
+    "none" for none, or None to search. The metadata state how one was found. ``flat``: a file with
+    several possible skeletons nearby is read without one, and the metadata mention it. Raises
+    SourceError if no skeleton can be chosen, and as ``read_source``.
     """
     source_format, data = load(path) if data is None else (format_of(path, data), data)
     if not source_format.wants_skeleton:
         return ReadMotion(read_source(path, source_format, None, data), None)
     try:
-        chosen = choose_skeleton(path, source_format, data, given)
+        chosen = choose_skeleton(path, source_format, data, skeleton_file)
     except AmbiguousError as error:
         if not flat:
             raise
@@ -136,7 +136,9 @@ def read_motion(
         return ReadMotion(read_source(path, source_format, None, data), None)
     motion = read_source(path, source_format, chosen.skeleton, data)
     if motion.skeleton is not chosen.skeleton:  # bones may come later than in the first frame
-        chosen = _with_misfits(path, source_format, data, chosen, asked=given is not None)
+        chosen = _with_misfits(
+            path, source_format, data, chosen, is_named=skeleton_file is not None
+        )
     return ReadMotion(with_note(motion, chosen.how), chosen)
 
 
@@ -149,18 +151,23 @@ def with_note(motion: Motion, how: str) -> Motion:
 
 
 def choose_skeleton(
-    path: Path, source_format: Format, data: bytes, given: Given
+    path: Path, source_format: Format, data: bytes, skeleton_file: Given
 ) -> SkeletonChoice | None:
     """The skeleton for the file ``path`` with the bytes ``data``, None if there is none."""
     assert source_format.bones is not None
     counts = source_format.bones(data)
-    if isinstance(given, Skeleton):
-        return _check_asked(path, given, _file_of(given) or f"the skeleton {given.name!r}", counts)
-    if given is not None:
-        if given == NONE:
+    if isinstance(skeleton_file, Skeleton):
+        return _check_asked(
+            path,
+            skeleton_file,
+            _file_of(skeleton_file) or f"the skeleton {skeleton_file.name!r}",
+            counts,
+        )
+    if skeleton_file is not None:
+        if skeleton_file == NONE:
             return None
-        choice = _check_asked(path, read_skeleton(given), str(given), counts)
-        return replace(choice, path=Path(given))
+        choice = _check_asked(path, read_skeleton(skeleton_file), str(skeleton_file), counts)
+        return replace(choice, path=Path(skeleton_file))
     return _choose_candidate(path, skeletons_around(path), counts) if counts else None
 
 
@@ -205,15 +212,17 @@ class _Candidate:
 def _choose_candidate(
     path: Path, around: Sequence[Candidate], counts: Counts
 ) -> SkeletonChoice | None:
-    named = [_try(candidate, counts) for candidate in around if candidate.name_of]
+    candidates = [_try(candidate, counts) for candidate in around if candidate.name_of]
     for grade in (2, 1):
-        fitting = [one for one in named if one.grade == grade]
+        fitting = [one for one in candidates if one.grade == grade]
         nearest = [one for one in fitting if one.candidate.rank == fitting[0].candidate.rank]
         if nearest:
-            return _only(path, nearest, named)
+            return _only(path, nearest, candidates)
     others = [_try(candidate, counts) for candidate in around if not candidate.name_of]
-    if named:
-        raise _riddle_error(path, [*named, *others], "a skeleton has its name, but not its bones")
+    if candidates:
+        raise _riddle_error(
+            path, [*candidates, *others], "a skeleton has its name, but not its bones"
+        )
     for grade in (2, 1):
         fitting = [one for one in others if one.grade == grade]
         if fitting:
@@ -252,13 +261,13 @@ def _only(path: Path, fitting: list[_Candidate], all_: list[_Candidate]) -> Skel
 
 
 def _with_misfits(
-    path: Path, source_format: Format, data: bytes, chosen: SkeletonChoice, *, asked: bool
+    path: Path, source_format: Format, data: bytes, chosen: SkeletonChoice, *, is_named: bool
 ) -> SkeletonChoice:
     """``chosen`` with a remark on the bones of the whole file that it does not fit."""
     assert source_format.bones is not None
     match = match_bones(chosen.skeleton, source_format.bones(data, whole=True))
     label = _printable(str(chosen.path or chosen.skeleton.name or "the skeleton"))
-    if match.lacking and not asked:
+    if match.lacking and not is_named:
         name = label if chosen.path is None else _printable(_seen_from(path.parent, chosen.path))
         raise SourceError(f"{name} lacks {_listed(match.lacking)}", path=path, hint=Hint.SKELETON)
     remark = chosen.remark
@@ -276,16 +285,16 @@ class AmbiguousError(SourceError):
     reason = ""
 
 
-def _ambiguous_error(path: Path, tried: Sequence[_Candidate], text: str) -> AmbiguousError:
-    riddle = _riddle_error(path, tried, text)
+def _ambiguous_error(path: Path, candidates: Sequence[_Candidate], text: str) -> AmbiguousError:
+    riddle = _riddle_error(path, candidates, text)
     error = AmbiguousError(riddle.message, **riddle.fields)
-    error.reason = f"{text}: {_listed([_printable(one.candidate.path.name) for one in tried])}"
+    error.reason = f"{text}: {_listed([_printable(one.candidate.path.name) for one in candidates])}"
     return error
 
 
-def _riddle_error(path: Path, tried: Sequence[_Candidate], text: str) -> SourceError:
-    shown = first_names([_printable(one.describe(path.parent)) for one in tried], SHOWN)
-    return SourceError(f"{text}: {shown}", path=path, hint=Hint.SKELETON)
+def _riddle_error(path: Path, candidates: Sequence[_Candidate], text: str) -> SourceError:
+    names = first_names([_printable(one.describe(path.parent)) for one in candidates], SHOWN)
+    return SourceError(f"{text}: {names}", path=path, hint=Hint.SKELETON)
 
 
 def _seen_from(folder: Path, path: Path) -> str:

@@ -247,15 +247,15 @@ def source_info(
     document: JsonObject = {"format": source_format.name, "file_bytes": len(data)}
     if source_format.is_skeleton:
         return document | {"skeletons": [_skeleton_facts(read_skeleton(path))], "clips": []}
-    taken = read_motion(path, skeleton, data=data)
-    if taken.remark:
-        warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
-    motion = taken.motion
+    result = read_motion(path, skeleton, data=data)
+    if result.remark:
+        warnings.warn(f"{path}: {result.remark}", SkeletonWarning, stacklevel=2)
+    motion = result.motion
     if motion.source is not None and source_format.is_table:  # there are several formats of .csv
         source_format = FORMATS[motion.source.format]
         document["format"] = source_format.name
     clip = _clip_facts(motion, source_format, path.name, data)
-    clip["skeleton_file"] = _file_of(taken.skeleton)
+    clip["skeleton_file"] = _file_of(result.skeleton)
     return document | {"skeletons": [_skeleton_facts(motion.skeleton)], "clips": [clip]}
 
 

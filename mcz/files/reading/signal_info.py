@@ -219,7 +219,7 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
     """``noted``: frame notes are legal."""
     limit = container.profile.segment_bytes
     per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
-    due = 0
+    frame = 0
     for row in info.rows:
         if row.packet == FRAME:
             # refuses an impossible packet
@@ -231,13 +231,15 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
         check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
         n_rows = row.header.n_frames * info.layout.samples_per_frame
         check(f"{where}: rows of a segment", n_rows, container.profile.rows)  # LIMIT-19
-        if row.header.first != due and not container.salvage:
+        if row.header.first != frame and not container.salvage:
             raise FormatError(
-                f"a segment begins at frame {row.header.first}; expected {due}", where=where
+                f"a segment begins at frame {row.header.first}; expected {frame}", where=where
             )
-        due = row.header.stop
-    if due != info.layout.n_frames and not container.salvage:
-        raise FormatError(f"the segments end at frame {due} of {info.layout.n_frames}", where=where)
+        frame = row.header.stop
+    if frame != info.layout.n_frames and not container.salvage:
+        raise FormatError(
+            f"the segments end at frame {frame} of {info.layout.n_frames}", where=where
+        )
 
 
 def parse_groups(
@@ -323,9 +325,9 @@ def salvage(
 
 
 def _rescue_start(
-    rescue: Callable[[int, int], None], start: int, stop: int, tried: int, complain: Complain
+    rescue: Callable[[int, int], None], start: int, stop: int, candidate: int, complain: Complain
 ) -> None:
-    if stop >= tried:
+    if stop >= candidate:
         return
     try:
         rescue(start, stop)

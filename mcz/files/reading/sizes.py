@@ -304,9 +304,9 @@ def _chunk_parts(chunk: Chunk, tables: dict[int, _Segment]) -> Iterator[tuple[in
 def _segment_parts(at: int, segment: _Segment) -> Iterator[tuple[int, int, str]]:
     table = segment.table
     header = table.header
-    what = f"signal {header.signal}, frames {header.first}:{header.stop}"
+    label = f"signal {header.signal}, frames {header.first}:{header.stop}"
     if table.size:
-        yield at, table.size, f"stream table, {what}"
+        yield at, table.size, f"stream table, {label}"
     names = {table.frame_notes(): "frame notes"}
     for group, called in enumerate(segment.groups[: table.counts.n_groups]):
         names[table.group_notes(group)] = f"notes of {called}"

@@ -184,7 +184,7 @@ def decimate_motion(motion: Motion, step: int) -> Motion:
 def _decimated_signal(signal: Signal, step: int) -> Signal:
     per_frame = signal.samples_per_frame
     frames, samples = np.divmod(signal.exceptions.rows, per_frame)
-    kept = np.flatnonzero(frames % step == 0)
+    rows = np.flatnonzero(frames % step == 0)
     n_frames = -(-signal.n_frames // step)
     changes = {}
     for row, channel, grid in sorted(signal.grid_changes, key=lambda change: change[0]):
@@ -202,9 +202,9 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
         mask=None if signal.mask is None else thin(signal.mask),
         ordinals=None if signal.ordinals is None else thin(signal.ordinals),
         exceptions=Exceptions(
-            frames[kept] // step * per_frame + samples[kept],
-            signal.exceptions.channels[kept],
-            tuple(signal.exceptions.texts[i] for i in kept),
+            frames[rows] // step * per_frame + samples[rows],
+            signal.exceptions.channels[rows],
+            tuple(signal.exceptions.texts[i] for i in rows),
         ),
         grid_changes=tuple((row, channel, grid) for (row, channel), grid in changes.items()),
     )

@@ -183,8 +183,8 @@ def _clear_leftovers(folder: Path, prefix: str) -> None:
     """Delete temporary files of killed writers, which are not locked."""
     with suppress(OSError, ValueError):
         for entry in os.scandir(folder):
-            named = entry.name.startswith(prefix) and entry.name.endswith(SUFFIX)
-            if not (named and entry.is_file(follow_symlinks=False)):
+            is_leftover = entry.name.startswith(prefix) and entry.name.endswith(SUFFIX)
+            if not (is_leftover and entry.is_file(follow_symlinks=False)):
                 continue
             with suppress(OSError), open(entry.path, "r+b") as leftover:
                 if is_abandoned(leftover):
@@ -339,8 +339,8 @@ class WriteTransaction:
         """Return True if the file restores these bytes as ``path``; raise if it restores others."""
         if path not in self.paths:
             return False
-        there = self.paths[path]
-        if (there if isinstance(there, bytes) else there()) == digest:
+        stored = self.paths[path]
+        if (stored if isinstance(stored, bytes) else stored()) == digest:
             return True
         raise SourceError(f"the archive already has a source file {path!r}", hint=Hint.REPLACE)
 
@@ -350,10 +350,10 @@ class WriteTransaction:
 
 
 def _snapshot(directory: Directory) -> Directory:
-    kept = copy(directory)
+    snapshot = copy(directory)
     for name in ("shared", "attachments", "aliases", "clips"):
-        setattr(kept, name, getattr(directory, name).copy())
-    return kept
+        setattr(snapshot, name, getattr(directory, name).copy())
+    return snapshot
 
 
 def alias_once(writer: Writer, name: str, id_: bytes) -> None:

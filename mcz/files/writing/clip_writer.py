@@ -118,18 +118,18 @@ def _decode(
     return Decoded(values, digest.digest())
 
 
-def _is_same(given: Values, decoded: Values) -> bool:
+def _is_same(source: Values, decoded: Values) -> bool:
     """True for equal bits, except those of NaN."""
-    own, other = (np.ascontiguousarray(values).view(np.int64) for values in (given, decoded))
-    if given.dtype == decoded.dtype and np.array_equal(own, other):
+    own, other = (np.ascontiguousarray(values).view(np.int64) for values in (source, decoded))
+    if source.dtype == decoded.dtype and np.array_equal(own, other):
         return True
-    return canonical(given) == canonical(decoded)
+    return canonical(source) == canonical(decoded)
 
 
-def _is_same_mask(given: NDArray[np.bool_] | None, decoded: NDArray[np.bool_] | None) -> bool:
-    if given is None or decoded is None:
-        return (given is None or bool(given.all())) and (decoded is None or bool(decoded.all()))
-    return np.array_equal(given, decoded)
+def _is_same_mask(source: NDArray[np.bool_] | None, decoded: NDArray[np.bool_] | None) -> bool:
+    if source is None or decoded is None:
+        return (source is None or bool(source.all())) and (decoded is None or bool(decoded.all()))
+    return np.array_equal(source, decoded)
 
 
 def write_skeletons(writer: Writer, skeletons: Sequence[StoredSkeleton]) -> bytes:
@@ -145,8 +145,8 @@ def write_skeletons(writer: Writer, skeletons: Sequence[StoredSkeleton]) -> byte
 
 def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
     """Write SKEL, after the SRCE of its own file if it has one; return its id."""
-    given = skeleton
-    if writer.last_skeleton is not None and writer.last_skeleton[0] is given:
+    original = skeleton
+    if writer.last_skeleton is not None and writer.last_skeleton[0] is original:
         id_ = writer.last_skeleton[1]
         if (ChunkType.SKEL, id_) in writer.directory.shared:  # not undone after a failure
             return id_
@@ -165,7 +165,7 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
         )
     payload = build_skeleton(skeleton, source)
     id_ = writer.shared(ChunkType.SKEL, pack_skeleton(payload) if writer.short else payload)
-    writer.last_skeleton = given, id_
+    writer.last_skeleton = original, id_
     return id_
 
 
@@ -217,8 +217,8 @@ def write_plan(
     if not quality or codec.lossless:
         return None
     settings, values = codec.settings(plan.options), [signal.values for signal in decoded]
-    named = quality_record(motion, values, codec.name, settings, plan.remarks)
-    stored = with_indices(named, motion.skeleton)
+    record = quality_record(motion, values, codec.name, settings, plan.remarks)
+    stored = with_indices(record, motion.skeleton)
     stored = amend(stored, values) if amend else stored
     writer.ancillary(ChunkType.QUAL, quality_payload(stored))
     return with_names(stored, motion.skeleton)
@@ -343,9 +343,11 @@ def quality_record(
 def _greatest_error(original: Motion, decoded: Signal) -> JsonObject:
     """The greatest error of a channel, without whole turns, and its frame and channel."""
     skeleton, signal = original.skeleton, original.signals[0]
-    given, decoded_values = (np.asarray(one.masked(), np.float64) for one in (signal, decoded))
+    source_values, decoded_values = (
+        np.asarray(one.masked(), np.float64) for one in (signal, decoded)
+    )
     with np.errstate(all="ignore"):  # overflow is no figure
-        errors = channel_errors(skeleton, signal, given, decoded_values)
+        errors = channel_errors(skeleton, signal, source_values, decoded_values)
     errors[~np.isfinite(errors)] = -1.0
     if not errors.size or errors.max() < 0:
         return {}

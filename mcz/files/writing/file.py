@@ -105,8 +105,8 @@ class SourceEncoder:
     @property
     def source_bytes(self) -> int:
         """The size of the file, and of the ASF that is stored with it."""
-        kept = self.inputs[:1] if self.reason else dict.fromkeys(self.inputs)
-        return sum(path.stat().st_size for path in kept)
+        files = self.inputs[:1] if self.reason else dict.fromkeys(self.inputs)
+        return sum(path.stat().st_size for path in files)
 
     def write(self, transaction: WriteTransaction, progress: Progress | None = None) -> str:
         """Write the file; return how: "skeleton", "parsed", "present" or "verbatim"."""
@@ -115,10 +115,10 @@ class SourceEncoder:
         digest = hashlib.sha256(data).digest()
         if transaction.holds(self.name, digest):
             return "present"
-        given = self._given_skeleton(data)
+        skeleton = self._given_skeleton(data)
         try:
             with transaction.step():
-                result = self._parse(transaction.writer, data, given, progress)
+                result = self._parse(transaction.writer, data, skeleton, progress)
         except (SourceError, MotionError, LimitError) as error:
             if not self.options.verbatim:
                 if isinstance(error, SourceError):
@@ -135,13 +135,15 @@ class SourceEncoder:
 
     def _given_skeleton(self, data: bytes) -> Given:
         """The requested skeleton, whose errors are not the source's fault."""
-        given = self.options.skeleton
-        if given is None or given == NONE or not wants_skeleton(self.path, data):
-            return None if given is None else NONE
-        self.inputs.append(Path(given))
-        return read_skeleton(given)
+        option = self.options.skeleton
+        if option is None or option == NONE or not wants_skeleton(self.path, data):
+            return None if option is None else NONE
+        self.inputs.append(Path(option))
+        return read_skeleton(option)
 
-    def _parse(self, writer: Writer, data: bytes, given: Given, progress: Progress | None) -> str:
+    def _parse(
+        self, writer: Writer, data: bytes, skeleton_file: Given, progress: Progress | None
+    ) -> str:
         source_format = format_of(self.path, data)
         if source_format.is_skeleton:
             self.notes = tuple(filter(None, [content_note(self.path, source_format)]))
@@ -149,10 +151,12 @@ class SourceEncoder:
             write_skeletons(writer, (StoredSkeleton(skeleton, path=self.name),))
             return "skeleton"
         _refuse_early(source_format, data, writer.profile)
-        taken = read_motion(self.path, given, self.options.unit, data, flat=self.options.flat)
-        motion = self.options.applied_to(taken.motion)
-        self._keep_notes(taken, motion)
-        notes = rate_notes(taken.motion.frame_rate, self.options)
+        result = read_motion(
+            self.path, skeleton_file, self.options.unit, data, flat=self.options.flat
+        )
+        motion = self.options.applied_to(result.motion)
+        self._keep_notes(result, motion)
+        notes = rate_notes(result.motion.frame_rate, self.options)
         self.notes += tuple(filter(None, [*notes, height_note(motion.skeleton)]))
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
@@ -160,20 +164,20 @@ class SourceEncoder:
         codec, params = self.encoding.selected_codec, self.encoding.params
         if not codec.lossless:  # the restored file differs: it states its rate
             motion = stating_rate(motion)
-        base = None if taken.skeleton is None else self._store_skeleton(taken.skeleton)
+        base = None if result.skeleton is None else self._store_skeleton(result.skeleton)
         prepared = prepare(motion, codec, params, stored_with_base(motion.skeleton, base))
         plan = tuned_plan(prepared, codec, params, writer.profile)
         self.quality = write_plan(writer, plan, progress)
         return "parsed"
 
-    def _keep_notes(self, taken: ReadMotion, motion: Motion) -> None:
+    def _keep_notes(self, result: ReadMotion, motion: Motion) -> None:
         """Keep what is odd about a file once the options have added what it left open."""
-        self.remark = taken.remark
-        keys = ("source-note", *(() if taken.skeleton is not None else (NOTE,)))
+        self.remark = result.remark
+        keys = ("source-note", *(() if result.skeleton is not None else (NOTE,)))
         notes = (motion.metadata.get(key, "") for key in keys)
         self.notes = tuple(filter(None, notes))
-        if taken.chosen is not None and taken.chosen.path is not None:
-            self.inputs.append(taken.chosen.path)
+        if result.chosen is not None and result.chosen.path is not None:
+            self.inputs.append(result.chosen.path)
 
     def _store_skeleton(self, skeleton: Skeleton) -> StoredSkeleton:
         """The skeleton of an ASF, under its own name if that is kept."""
@@ -187,13 +191,13 @@ def rate_notes(stated: Fraction | None, options: SourceOptions) -> Iterator[str]
     """A note if the frame rate in a file differs from the requested one."""
     if stated is None or options.rate is None:
         return
-    asked = float(parse_rate(options.rate))
-    if abs(float(stated) / asked - 1) <= SAME_RATE:
+    requested = float(parse_rate(options.rate))
+    if abs(float(stated) / requested - 1) <= SAME_RATE:
         return
     if options.force_rate:
-        yield (f"its {float(stated):g} frames a second are replaced by {asked:g}, as requested")
+        yield (f"its {float(stated):g} frames a second are replaced by {requested:g}, as requested")
     else:
-        text = f"it states {float(stated):g} frames a second, {asked:g} are asked for"
+        text = f"it states {float(stated):g} frames a second, {requested:g} are asked for"
         yield Remark(text, Hint.FORCE_RATE)
 
 

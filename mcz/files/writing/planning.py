@@ -104,14 +104,14 @@ def wants_positions(codec: Codec, options: Params, skeleton: Skeleton) -> bool:
     return point_set(skeleton) != "markers"
 
 
-def check_bones(skeleton: Skeleton, what: str) -> None:
+def check_bones(skeleton: Skeleton, label: str) -> None:
     """Raise OptionError if rotations move no point, since no bone has a length.
 
-    Arrays of body models are such: ``what`` would then depend on the root alone.
+    Arrays of body models are such: ``label`` would then depend on the root alone.
     """
     if has_no_lengths(skeleton):
         raise OptionError(
-            f"{what} has no meaning: {NO_LENGTHS}, so rotations move no point; set rest offsets"
+            f"{label} has no meaning: {NO_LENGTHS}, so rotations move no point; set rest offsets"
         )
 
 
@@ -328,9 +328,9 @@ def _source_record(source: Source | None, template: bytes | None) -> payloads.Cl
 
 def _signal_record(plan: SignalPlan) -> payloads.Signal:
     signal, codec, encoded = plan.source.signal, plan.codec, plan.encoded
-    own, listed = signal.channels is not None, plan.source.is_listed
-    kind = payloads.GROUP_LISTED if listed else group_kind(signal, codec.grouping)
-    sizes = [len(group) for group in plan.source.layout.groups] if listed else None
+    own, is_listed = signal.channels is not None, plan.source.is_listed
+    kind = payloads.GROUP_LISTED if is_listed else group_kind(signal, codec.grouping)
+    sizes = [len(group) for group in plan.source.layout.groups] if is_listed else None
     return payloads.Signal(
         name=signal.name,
         flags=payloads.OWN_CHANNELS if own else 0,

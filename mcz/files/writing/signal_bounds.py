@@ -35,46 +35,46 @@ TRIALS = 10
 GOOD_ENOUGH = 0.97  # of a requested mean error: near enough
 
 
-def with_bounds(motion: Motion, codec: Codec, asked: Params) -> tuple[Motion, dict[str, str]]:
-    """``motion`` with coarser signals as the bounds ``asked`` for allow.
+def with_bounds(motion: Motion, codec: Codec, options: Params) -> tuple[Motion, dict[str, str]]:
+    """``motion`` with coarser signals as the bounds ``options`` for allow.
 
     Also returns entries of the quality record. Raises OptionError for a bad bound.
     """
     if codec.lossless:
         raise OptionError(
-            f"{next(iter(asked))}: codec {codec.name} is lossless; choose a lossy codec "
+            f"{next(iter(options))}: codec {codec.name} is lossless; choose a lossy codec "
             "(lossless=all keeps its motion exact)"
         )
     signals, numbers = list(motion.signals), {n: i for i, n in enumerate(named_signals(motion), 1)}
     remarks: dict[str, str] = {}
-    for name in dict.fromkeys(key.rpartition(".")[0] for key in asked):
+    for name in dict.fromkeys(key.rpartition(".")[0] for key in options):
         if name not in numbers:
             raise OptionError(
                 f"no signal besides the motion is called {name!r}; there are {[*numbers]}"
             )
-        given = signals[numbers[name]]
-        if given.role in EXACT_ROLES:
-            raise OptionError(f"signal {name!r} must stay exact: {EXACT_ROLES[given.role]}")
+        source = signals[numbers[name]]
+        if source.role in EXACT_ROLES:
+            raise OptionError(f"signal {name!r} must stay exact: {EXACT_ROLES[source.role]}")
         limits = [
-            _limits(motion.skeleton, given, f"{name}.{error}", asked)
+            _limits(motion.skeleton, source, f"{name}.{error}", options)
             for error in (MAX_ERROR, MEAN_ERROR)
         ]
-        motion, coarse = _coarsen(motion, given, *limits)
+        motion, coarse = _coarsen(motion, source, *limits)
         signals[numbers[name]] = coarse
-        errors = signal_errors(motion.skeleton, given, coarse)
+        errors = signal_errors(motion.skeleton, source, coarse)
         figures = {"mse": errors.mse, MAX_ERROR: errors.greatest, MEAN_ERROR: errors.mean}
         known = {k: v for k, v in figures.items() if v is not None}
         remarks |= {f"signal.{name}.{key}": repr(value) for key, value in known.items()}
-    remarks |= {f"param.{key}": str(value) for key, value in asked.items()}
+    remarks |= {f"param.{key}": str(value) for key, value in options.items()}
     return replace(motion, signals=tuple(signals)), remarks
 
 
-def _limits(skeleton: Skeleton, signal: Signal, key: str, asked: Params) -> Floats:
+def _limits(skeleton: Skeleton, signal: Signal, key: str, options: Params) -> Floats:
     """The bound of each channel in its own unit, (n_channels,); infinite without one."""
     channels = skeleton.channels if signal.channels is None else signal.channels
-    if key not in asked:
+    if key not in options:
         return np.full(len(channels), math.inf)
-    return limits_of(skeleton, channels, key, asked[key])
+    return limits_of(skeleton, channels, key, options[key])
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,21 +115,21 @@ def _coarsen(
     motion: Motion, signal: Signal, greatest: Floats, mean: Floats
 ) -> tuple[Motion, Signal]:
     """The signal within these bounds of each channel, and the motion with a source of it."""
-    given = list(_columns(signal))
+    source = list(_columns(signal))
     of_c3d = recording_of(motion.source) is not None
-    rescales = of_c3d and signal.role == "analog" and _states_scales(motion.source, given)
+    rescales = of_c3d and signal.role == "analog" and _states_scales(motion.source, source)
     columns = [
         _coarsen_column(
             column, most, average, SourceRules(motion.source is not None, of_c3d, rescales)
         )
-        for column, most, average in zip(given, greatest.tolist(), mean.tolist(), strict=True)
+        for column, most, average in zip(source, greatest.tolist(), mean.tolist(), strict=True)
     ]
-    scales = {c: new.scale for c, new in enumerate(columns) if new.scale != given[c].scale}
+    scales = {c: new.scale for c, new in enumerate(columns) if new.scale != source[c].scale}
     if scales:
         assert motion.source is not None
         motion = replace(motion, source=with_analog_scales(motion.source, scales))
         signal = replace(signal, scaling=recording_of(motion.source).scaling, stored=signal.stored)
-    changed = [c for c, new in enumerate(columns) if new is not given[c]]
+    changed = [c for c, new in enumerate(columns) if new is not source[c]]
     if not changed:
         return motion, signal
     grids = tuple(column.grid for column in columns)
@@ -140,7 +140,7 @@ def _coarsen(
     for c in changed:
         numbers[:, c] = columns[c].numbers
         if ordinals is not None:  # also known for NaNs
-            same = given[c].kept & (grids[c] == given[c].grid)
+            same = source[c].kept & (grids[c] == source[c].grid)
             ordinals[:, c] = np.where(same, ordinals[:, c], 0)
     signal = replace(
         signal,
@@ -159,17 +159,17 @@ def _states_scales(source: Source | None, columns: Sequence[Column]) -> bool:
 
 
 def _columns(signal: Signal) -> Iterator[Column]:
-    kept = ~np.isfinite(signal.values)
-    kept[signal.exceptions.rows, signal.exceptions.channels] = True
-    valid = np.ones(kept.shape, np.bool_) if signal.mask is None else signal.mask
+    exempt = ~np.isfinite(signal.values)
+    exempt[signal.exceptions.rows, signal.exceptions.channels] = True
+    valid = np.ones(exempt.shape, np.bool_) if signal.mask is None else signal.mask
     scaling = signal.scaling
     for c, grid in enumerate(signal.grids):
         column = Column(
             signal.values[:, c].astype(np.float64),
             signal.stored[:, c].astype(np.float64),
             grid,
-            kept[:, c],
-            valid[:, c] & ~kept[:, c],
+            exempt[:, c],
+            valid[:, c] & ~exempt[:, c],
         )
         if scaling is not None:
             own = float(scaling.offsets[c]), float(scaling.scales[c]), float(scaling.general)
@@ -215,14 +215,14 @@ def _mean_error(column: Column, rounded: Column, greatest: float) -> float:
     return float(errors.mean()) if len(errors) else 0.0
 
 
-def is_within(given: Floats, rounded: Floats, bound: float) -> Bools:
+def is_within(source: Floats, rounded: Floats, bound: float) -> Bools:
     """True where |given - rounded| <= bound, without any rounding."""
     if bound == math.inf:
         return np.isfinite(rounded)
     with np.errstate(all="ignore"):
-        error = given - rounded
-        back = error - given
-        rest = (given - (error - back)) - (rounded + back)  # of the subtraction
+        error = source - rounded
+        back = error - source
+        rest = (source - (error - back)) - (rounded + back)  # of the subtraction
         at_bound = (np.abs(error) == bound) & (rest * np.sign(error) <= 0)
         return np.asarray((np.abs(error) < bound) | at_bound)
 

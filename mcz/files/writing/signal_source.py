@@ -48,8 +48,8 @@ class MemorySource:
         parts = codec.partition(motion.skeleton, options) if codec.partition and options else None
         self.is_listed = parts is not None
         kinds = payloads.Groups(kind=group_kind(signal, codec.grouping))
-        usual = parse_groups(kinds, motion.skeleton, signal.n_channels)
-        groups, exact = parts or (usual, ())
+        default = parse_groups(kinds, motion.skeleton, signal.n_channels)
+        groups, exact = parts or (default, ())
         self.is_lossless = codec.lossless
         self.exact = [channel for group in exact for channel in groups[group]]
         # A value from a lossy codec is no longer the number that an exception spells.
@@ -117,8 +117,8 @@ class MemorySource:
         ):
             group, column = where[int(channel)]
             row = int(number) - before[group]
-            odd = OddToken(row=row, channel=column, text=text)
-            notes[group].exceptions.append(odd)
+            note = OddToken(row=row, channel=column, text=text)
+            notes[group].exceptions.append(note)
             before[group] = int(number)
         return [build(n, "group notes") if n.grid_changes or n.exceptions else b"" for n in notes]
 
@@ -133,9 +133,9 @@ class MemorySource:
 
 def _with_exceptions_of(signal: Signal, channels: Sequence[int]) -> Signal:
     old = signal.exceptions
-    kept = np.flatnonzero(np.isin(old.channels, channels))
-    texts = tuple(old.texts[i] for i in kept)
-    return replace(signal, exceptions=Exceptions(old.rows[kept], old.channels[kept], texts))
+    rows = np.flatnonzero(np.isin(old.channels, channels))
+    texts = tuple(old.texts[i] for i in rows)
+    return replace(signal, exceptions=Exceptions(old.rows[rows], old.channels[rows], texts))
 
 
 def _freed(signal: Signal, channels: Sequence[int]) -> Signal:

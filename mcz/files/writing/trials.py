@@ -218,10 +218,10 @@ def _first_step(dial: Dial, target: Target, trial: Trials) -> float:
     for _ in range(MOST_CALIBRATIONS):
         octaves = np.zeros(trial.motion.n_frames, np.int64)
         errors = trial.frame_errors(target, {dial.parameter: step, REFINEMENT: octaves})
-        usual = float(np.quantile(errors, COMMON)) / target.limit if len(errors) else 0.0
-        if not usual or LEAST_COMMON <= usual <= MOST_COMMON:
+        ratio = float(np.quantile(errors, COMMON)) / target.limit if len(errors) else 0.0
+        if not ratio or LEAST_COMMON <= ratio <= MOST_COMMON:
             break
-        step *= min(max(WANTED_COMMON / usual, 0.1), 10.0)
+        step *= min(max(WANTED_COMMON / ratio, 0.1), 10.0)
     return step
 
 

@@ -65,11 +65,11 @@ def tuned_plan(prepared: Prepared, codec: Codec, params: Params, profile: Profil
     Raises OptionError if a target cannot be met or has no meaning for this clip, and as
     ``plan_clip``.
     """
-    asked, bounds = split_bounds(params)
+    wishes, bounds = split_bounds(params)
     motion, bounded = (
         with_bounds(prepared.motion, codec, bounds) if bounds else (prepared.motion, {})
     )
-    options, remarks = tune(motion, codec, asked, profile)
+    options, remarks = tune(motion, codec, wishes, profile)
     plan = plan_clip(replace(prepared, motion=motion), codec, options, profile)
     return replace(plan, remarks=remarks | bounded)
 
@@ -122,10 +122,10 @@ def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Li
     weights: JsonObject = {}
     for _ in range(MOST_TURNS):
         settings, remarks = _meet_target(codec, target, trial.with_params(weights))
-        weights, kept = weigh_joints(codec.dial, trial, limits, {**settings, **weights})
+        weights, settings_kept = weigh_joints(codec.dial, trial, limits, {**settings, **weights})
         both = {**settings, **weights}
         if target is None or trial.figure(target, both) <= target.limit:
-            return both, {**remarks, **kept}
+            return both, {**remarks, **settings_kept}
     name = "" if target is None else f"{target.name} {target.limit:g}"
     raise OptionError(f"{QUALITY} and {name} cannot be met together")
 
@@ -205,11 +205,11 @@ def search(
     Raises OptionError if no setting meets it. A figure such as a greatest error may jump up and
     down.
     """
-    tried: list[Point] = []
+    points: list[Point] = []
 
     def measured(target: Target, setting: float) -> float:
-        tried.append((setting, measure(target, setting)))
-        return tried[-1][1]
+        points.append((setting, measure(target, setting)))
+        return points[-1][1]
 
     bracket = _follow_guesses(dial, target, measured) or _bracket(dial, target, measured)
     meets, misses, ended = bracket
@@ -228,7 +228,7 @@ def search(
             meets = point
         else:
             misses = point
-    met = (point for point in reversed(tried) if point[1] <= target.limit)
+    met = (point for point in reversed(points) if point[1] <= target.limit)
     best = max(met, key=itemgetter(1))
     if best[1] < PROMISED * target.limit:
         best = _search_beside(best, dial, target, measure)
@@ -304,8 +304,8 @@ def _follow_guesses(
         if meets and (misses or meets[1] >= GOAL * target.limit):
             return meets, misses or meets, False
         assert dial.guess is not None
-        here, there = (dial.guess(target.name, figure or aim) for figure in (point[1], aim))
-        setting = setting * there / here if here and there and point[1] < math.inf else None
+        here, wanted = (dial.guess(target.name, figure or aim) for figure in (point[1], aim))
+        setting = setting * wanted / here if here and wanted and point[1] < math.inf else None
     return None
 
 

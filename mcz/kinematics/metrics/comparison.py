@@ -237,10 +237,10 @@ def _blocks(original: Motion, decoded: Motion) -> Iterator[tuple[int, Floats, Fl
 def named_signals(motion: Motion) -> dict[str, Signal]:
     """Signals other than the motion by role, else name; the second of a name is NAME#1."""
     signals: dict[str, Signal] = {}
-    seen: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for signal in motion.signals[1:]:
         key = signal.role or signal.name
-        seen[key] = n = seen.get(key, -1) + 1
+        counts[key] = n = counts.get(key, -1) + 1
         signals[key if n == 0 else f"{key}#{n}"] = signal
     return signals
 

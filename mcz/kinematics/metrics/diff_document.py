@@ -87,9 +87,9 @@ def joint_errors(original: Motion, other: Motion) -> JointErrors:
 
 def pairs_of(a: Skeleton, b: Skeleton) -> list[tuple[int, int]]:
     """The joints that both have, by index; names are equal in any case of letters."""
-    there = {name.lower(): index for index, name in reversed(list(enumerate(b.addresses())))}
+    indices = {name.lower(): index for index, name in reversed(list(enumerate(b.addresses())))}
     names = enumerate(a.addresses())
-    return [(index, there[name.lower()]) for index, name in names if name.lower() in there]
+    return [(index, indices[name.lower()]) for index, name in names if name.lower() in indices]
 
 
 def _measure_joints(

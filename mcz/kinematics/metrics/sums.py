@@ -194,17 +194,17 @@ class ChangeErrors:
         """Points of shape (n_rows, n, 3) from row ``start`` on, NaN where unknown."""
         n_before = len(self._off)
         known = known_points(left) & known_points(right)
-        off = np.concatenate([self._off, np.where(known[:, :, None], left - right, 0.0)])
+        errors = np.concatenate([self._off, np.where(known[:, :, None], left - right, 0.0)])
         valid = np.concatenate([self._valid, known])
         for order, sums in ((1, self.velocity), (2, self.acceleration)):
             first = max(n_before - order, 0)
-            n_rows = len(off) - first - order
+            n_rows = len(errors) - first - order
             if n_rows > 0:
-                changed = np.sqrt(squared_norms(np.diff(off[first:], order, axis=0)))
+                changed = np.sqrt(squared_norms(np.diff(errors[first:], order, axis=0)))
                 both = [valid[first + k : first + k + n_rows] for k in range(order + 1)]
                 counted = np.logical_and.reduce(both)
                 sums.add(start + first + order - n_before, np.where(counted, changed, 0.0), counted)
-        self._off, self._valid = off[-2:], valid[-2:]
+        self._off, self._valid = errors[-2:], valid[-2:]
 
 
 def known_points(points: Floats) -> Bools:
@@ -232,10 +232,10 @@ class RunningFigures:
         self._most = -1.0
         self._where: tuple[int, int] | None = None
 
-    def add(self, given: Floats, decoded: Floats) -> None:
-        """Add a frame; NaN in ``given`` does not count."""
+    def add(self, values: Floats, decoded: Floats) -> None:
+        """Add a frame; NaN in ``values`` does not count."""
         with np.errstate(all="ignore"):  # overflow is no figure
-            squares = np.square(decoded - given)
+            squares = np.square(decoded - values)
             self._squares, self._values = _add_valid(self._squares, self._values, squares)
             if self._positions:
                 distances = np.sqrt(squares.reshape(-1, 3).sum(axis=1))

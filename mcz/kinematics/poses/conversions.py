@@ -126,16 +126,16 @@ def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
     Raises OptionError if the shape does not fit.
     """
     check_form(form)
-    given: Floats = np.asarray(values, np.float64)
+    array: Floats = np.asarray(values, np.float64)
     tail = FORMS[form]
-    if given.shape[-len(tail) :] != tail:
+    if array.shape[-len(tail) :] != tail:
         raise OptionError(
-            f"rotations as {form!r} must have a shape that ends in {tail}, not {given.shape}"
+            f"rotations as {form!r} must have a shape that ends in {tail}, not {array.shape}"
         )
     if form == "matrix":
-        return given
-    lead = given.shape[: -len(tail)]
-    flat = given.reshape(-1, *tail)
+        return array
+    lead = array.shape[: -len(tail)]
+    flat = array.reshape(-1, *tail)
     if form == "6d":
         return _from_6d(flat).reshape(*lead, 3, 3)
     if form == "euler":
@@ -213,7 +213,7 @@ SPACES = ("local", "world")
 
 
 def rotations(
-    moving: MotionLike,
+    motion: MotionLike,
     form: str = "quat",
     *,
     space: str = "local",
@@ -241,11 +241,11 @@ def rotations(
     check_order(order)
     if space not in SPACES:
         raise OptionError(f"unknown space {space!r}; it must be one of {', '.join(SPACES)}")
-    skeleton, span = moving.skeleton, frame_range(moving, frames)
+    skeleton, span = motion.skeleton, frame_range(motion, frames)
     chosen = joint_numbers(skeleton, joints)
     poses = frame_poses_of(skeleton)
     needed = chosen if space == "local" else poses.above(chosen)
-    values = values_of(moving, span, needed)
+    values = values_of(motion, span, needed)
     turns = poses.local(values, chosen) if space == "local" else poses.world(values, chosen)
     converted = from_matrices(turns, form, order)
     if degrees:
@@ -275,8 +275,8 @@ def scalar_quaternions(
     places = [at for at in range(len(names) - SIZE + 1) if None not in names[at : at + SIZE]]
     units = {at: _is_unit(values[:, at : at + SIZE]) for at in places}
     starts = [at for at in places if units[at]]
-    named = {at for at in places if all(map(_is_named, names[at : at + SIZE]))}
-    for at in sorted(named):
+    firsts = {at for at in places if all(map(_is_named, names[at : at + SIZE]))}
+    for at in sorted(firsts):
         inside = any(other in starts for other in range(at - SIZE + 1, at + SIZE))
         if units[at] is False and not inside:
             raise OptionError(
@@ -286,9 +286,9 @@ def scalar_quaternions(
     accepted: list[int] = []
     for at in starts:
         rivals = [other for other in starts if other != at and abs(other - at) < SIZE]
-        if not rivals or (at in named and named.isdisjoint(rivals)):
+        if not rivals or (at in firsts and firsts.isdisjoint(rivals)):
             accepted.append(at)
-        elif named.isdisjoint([at, *rivals]):
+        elif firsts.isdisjoint([at, *rivals]):
             raise OptionError(
                 f"{_describe_columns(names, at)} may be a quaternion or independent columns{HINT}"
             )

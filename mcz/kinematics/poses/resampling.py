@@ -115,12 +115,12 @@ def times_of(timeline: Timeline, rate: Fraction, signal: Signal) -> tuple[Ints, 
     Counted from 0 at its first time, in exact arithmetic if times lie at whole multiples of 1 /
     rate. Raises OptionError if they would be too many.
     """
-    room = MOST_VALUES // max(1, signal.n_channels)
+    most_rows = MOST_VALUES // max(1, signal.n_channels)
     parts: list[tuple[Ints, FrameTimes]] = []
     for run in timeline.runs:
         frames, lie = frames_within(timeline, rate, run)
-        room -= max(0, frames.stop - frames.start)  # too many for len()
-        if room < 0:
+        most_rows -= max(0, frames.stop - frames.start)  # too many for len()
+        if most_rows < 0:
             raise too_many_frames_error(timeline, rate)
         parts.append((np.array(frames, np.int64), lie(frames)))
     if not parts:

@@ -33,13 +33,13 @@ from mcz.model.text_format import fields_text, suggest_names
 from mcz.model.types import Floats, Reals
 
 
-def point_names(moving: MotionLike | Skeleton, joints: Joints = None) -> tuple[str, ...]:
+def point_names(motion: MotionLike | Skeleton, joints: Joints = None) -> tuple[str, ...]:
     """The names of the points whose ``positions`` are given, in their order.
 
     A name is the joint's, with " end" for an end site of a BVH. The point of an Acclaim joint is
     the end of its bone.
     """
-    skeleton = moving if isinstance(moving, Skeleton) else moving.skeleton
+    skeleton = motion if isinstance(motion, Skeleton) else motion.skeleton
     names = names_of_points(skeleton)
     return names if joints is None else tuple(names[p] for p in find_points(skeleton, joints))
 
@@ -67,7 +67,7 @@ def find_points(skeleton: Skeleton, joints: Joints) -> list[int]:
 
 
 def positions(
-    moving: MotionLike,
+    motion: MotionLike,
     joints: Joints = None,
     frames: Frames = None,
     *,
@@ -82,20 +82,20 @@ def positions(
     OptionError, and MotionError if the skeleton has no kinematics: its angle unit is unknown, or
     all of its channels are plain scalars.
     """
-    scale = scale_to(moving.skeleton, unit)
-    places = _positions(moving, joints, frame_range(moving, frames))
+    scale = scale_to(motion.skeleton, unit)
+    places = _positions(motion, joints, frame_range(motion, frames))
     return as_type(places if scale == 1.0 else places * scale, dtype)
 
 
-def _positions(moving: MotionLike, joints: Joints, span: tuple[int, int]) -> Floats:
-    points = find_points(moving.skeleton, joints)
-    poses = frame_poses_of(moving.skeleton)
+def _positions(motion: MotionLike, joints: Joints, span: tuple[int, int]) -> Floats:
+    points = find_points(motion.skeleton, joints)
+    poses = frame_poses_of(motion.skeleton)
     needed = poses.above(poses.joints_of(points))
-    return poses.positions(values_of(moving, span, needed), points)
+    return poses.positions(values_of(motion, span, needed), points)
 
 
 def velocities(
-    moving: MotionLike,
+    motion: MotionLike,
     joints: Joints = None,
     frames: Frames = None,
     *,
@@ -110,11 +110,11 @@ def velocities(
     frames has the same results as the whole. Arguments and errors are those of ``positions``;
     OptionError also if the times are unknown.
     """
-    return as_type(_derivative(moving, joints, frames, unit, 1, velocities_of), dtype)
+    return as_type(_derivative(motion, joints, frames, unit, 1, velocities_of), dtype)
 
 
 def accelerations(
-    moving: MotionLike,
+    motion: MotionLike,
     joints: Joints = None,
     frames: Frames = None,
     *,
@@ -127,11 +127,11 @@ def accelerations(
     time the value of the neighbor frame, NaN in a run of fewer than three. Otherwise as
     ``velocities``.
     """
-    return as_type(_derivative(moving, joints, frames, unit, 2, accelerations_of), dtype)
+    return as_type(_derivative(motion, joints, frames, unit, 2, accelerations_of), dtype)
 
 
 def _derivative(
-    moving: MotionLike,
+    motion: MotionLike,
     joints: Joints,
     frames: Frames,
     unit: str | None,
@@ -142,11 +142,11 @@ def _derivative(
 
     Reads ``reach`` frames more on both sides, so that a part has the results of the whole.
     """
-    scale = scale_to(moving.skeleton, unit)
-    steps = known_timeline(moving.name, moving.timeline).steps
-    start, stop = frame_range(moving, frames)
-    low, high = max(0, start - reach), min(moving.n_frames, stop + reach)
-    places = _positions(moving, joints, (low, high)) * scale
+    scale = scale_to(motion.skeleton, unit)
+    steps = known_timeline(motion.name, motion.timeline).steps
+    start, stop = frame_range(motion, frames)
+    low, high = max(0, start - reach), min(motion.n_frames, stop + reach)
+    places = _positions(motion, joints, (low, high)) * scale
     return derive(places, steps[low : max(low, high - 1)])[start - low : stop - low]
 
 
@@ -185,7 +185,7 @@ class Root:
 
 
 def root(
-    moving: MotionLike,
+    motion: MotionLike,
     frames: Frames = None,
     *,
     joint: int | str | None = None,
@@ -197,11 +197,11 @@ def root(
     ``joint`` selects another than the first. Raises as ``positions``, and MotionError if the
     skeleton has no joint.
     """
-    skeleton, span = moving.skeleton, frame_range(moving, frames)
+    skeleton, span = motion.skeleton, frame_range(motion, frames)
     scale = scale_to(skeleton, unit)
     (number,) = joint_numbers(skeleton, 0 if joint is None else joint)
     poses = frame_poses_of(skeleton)
-    values = values_of(moving, span, poses.above([number]))
+    values = values_of(motion, span, poses.above([number]))
     turns = from_matrices(poses.world(values, [number]), "quat")
     return Root(
         skeleton.addresses()[number],

@@ -79,9 +79,9 @@ def _check_tree(skeleton: Skeleton, others: list[int]) -> None:
     """Counterparts hang on counterparts."""
     names = skeleton.joint_names
     for index, other in enumerate(others):
-        parent, there = skeleton.joints[index].parent, skeleton.joints[other].parent
-        if (others[parent] if parent >= 0 else -1) != there:
-            on = [names[k] if k >= 0 else "nothing" for k in (parent, there)]
+        parent, other_parent = skeleton.joints[index].parent, skeleton.joints[other].parent
+        if (others[parent] if parent >= 0 else -1) != other_parent:
+            on = [names[k] if k >= 0 else "nothing" for k in (parent, other_parent)]
             raise OptionError(
                 f"mirror: {names[index]!r} is a child of {on[0]!r} and its counterpart "
                 f"{names[other]!r} of {on[1]!r}, but these two are not counterparts; pair "

@@ -131,8 +131,8 @@ class _Retargeted:
         missed: dict[int, Floats] = {-1: IDENTITY}
         for joint, other in self.pairs.items():
             above = nearest_above(self.target, joint, self.pairs)
-            there = self.pairs[above] if above >= 0 else -1
-            turn = relative_turns(self.theirs, there, other, self.turns)
+            pair = self.pairs[above] if above >= 0 else -1
+            turn = relative_turns(self.theirs, pair, other, self.turns)
             turn = multiply_matrices(
                 multiply_matrices(inverse_turns(self.rest[above]), turn), self.rest[joint]
             )

@@ -42,7 +42,7 @@ from mcz.model.types import Floats
 Named = TypeVar("Named", Motion, Skeleton)
 
 
-def rename(named: Named, mapping: Mapping[str, str]) -> Named:
+def rename(new_names: Named, mapping: Mapping[str, str]) -> Named:
     """Rename the joints of a motion or skeleton by ``mapping``, from old name to new.
 
     Other joints keep their names; if a name repeats, ``name#1`` is the second joint of that
@@ -51,21 +51,21 @@ def rename(named: Named, mapping: Mapping[str, str]) -> Named:
 
     Raises OptionError for an unknown joint, and for a name that two joints would have.
     """
-    skeleton = named if isinstance(named, Skeleton) else named.skeleton
+    skeleton = new_names if isinstance(new_names, Skeleton) else new_names.skeleton
     names = _names(skeleton, mapping)
     joints = tuple(
         replace(joint, name=name) for joint, name in zip(skeleton.joints, names, strict=True)
     )
     renamed = replace(skeleton, joints=joints, base=None, source=None)
-    if isinstance(named, Skeleton):
+    if isinstance(new_names, Skeleton):
         return renamed
-    return replace_motion(named, renamed, named.signals[0])
+    return replace_motion(new_names, renamed, new_names.signals[0])
 
 
 def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
     addresses = skeleton.joint_names
     names = [joint.name for joint in skeleton.joints]
-    given: set[int] = set()
+    used: set[int] = set()
     for old, new in mapping.items():
         if old not in addresses:
             raise OptionError(
@@ -75,8 +75,8 @@ def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
             raise OptionError(f"rename: {new!r} is not a valid name for joint {old!r}")
         index = addresses.index(old)
         names[index] = new
-        given.add(index)
-    for index in sorted(given):
+        used.add(index)
+    for index in sorted(used):
         if names.count(names[index]) > 1:
             addresses_of_name = [
                 addresses[k] for k, name in enumerate(names) if name == names[index]
@@ -91,14 +91,14 @@ def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
 Given = TypeVar("Given", Motion, Skeleton)
 
 
-def with_offsets(given: Given, offsets: ArrayLike, unit_cm: float | None = None) -> Given:
+def with_offsets(item: Given, offsets: ArrayLike, unit_cm: float | None = None) -> Given:
     """A motion or skeleton with these rest offsets, (n_joints, 3), and ``unit_cm`` if given.
 
     They lead from each parent's origin to the joint's own, along the world's axes at rest. Numbers
     stay unchanged; lengths of bones and so positions of joints change. The result has no source.
     Raises OptionError for another shape, or a number that is not finite.
     """
-    skeleton = given if isinstance(given, Skeleton) else given.skeleton
+    skeleton = item if isinstance(item, Skeleton) else item.skeleton
     new_offsets = np.asarray(offsets, np.float64)
     if new_offsets.shape != (skeleton.n_joints, 3) or not np.isfinite(new_offsets).all():
         raise OptionError(
@@ -111,7 +111,7 @@ def with_offsets(given: Given, offsets: ArrayLike, unit_cm: float | None = None)
     )
     unit = skeleton.unit_cm if unit_cm is None else unit_cm
     made = replace(skeleton, joints=joints, unit_cm=unit, base=None, source=None)
-    return made if isinstance(given, Skeleton) else replace_motion(given, made, given.signals[0])
+    return made if isinstance(item, Skeleton) else replace_motion(item, made, item.signals[0])
 
 
 SCALING = ("sx", "sy", "sz")
@@ -137,45 +137,47 @@ def select(
     """
     check_channels(motion)
     skeleton = motion.skeleton
-    kept = _kept_joints(skeleton, joints)
-    above = _parents(skeleton, kept)
-    moved = {joint: name for joint in kept if (name := _obstacle(motion, joint, above[joint]))}
+    indices = _kept_joints(skeleton, joints)
+    above = _parents(skeleton, indices)
+    moved = {joint: name for joint in indices if (name := _obstacle(motion, joint, above[joint]))}
     if moved and not allow_translation:
         joint, name = next(iter(moved.items()))
         raise OptionError(
             f"select: joint {name!r} moves {skeleton.joint_names[joint]!r}, which is kept; "
             "keep both, or set allow_translation=True to give the latter position channels"
         )
-    numbers = {joint: number for number, joint in enumerate(kept)} | {-1: -1}
+    numbers = {joint: number for number, joint in enumerate(indices)} | {-1: -1}
     chosen = [
         replace(_fold_offsets(skeleton, joint, above[joint]), parent=numbers[above[joint]])
-        for joint in kept
+        for joint in indices
     ]
-    signal = motion.signals[0].of_columns(joint_columns(skeleton, kept))
+    signal = motion.signals[0].of_columns(joint_columns(skeleton, indices))
     selected = replace(skeleton, joints=tuple(chosen), base=None, source=None)
     if moved:
-        selected, signal = bake_joints(motion, {j: above[j] for j in moved}, kept, selected, signal)
+        selected, signal = bake_joints(
+            motion, {j: above[j] for j in moved}, indices, selected, signal
+        )
     return replace_motion(motion, selected, signal)
 
 
 def _kept_joints(skeleton: Skeleton, joints: str | int | Iterable[str | int]) -> list[int]:
-    named = [joints] if isinstance(joints, (str, int, np.integer)) else list(joints)
-    if not named:
+    requested = [joints] if isinstance(joints, (str, int, np.integer)) else list(joints)
+    if not requested:
         raise OptionError("select: keep at least one joint")
-    kept = set()
-    for joint in named:
+    indices = set()
+    for joint in requested:
         try:
-            kept.add(skeleton.find(joint))
+            indices.add(skeleton.find(joint))
         except MotionError:
             names = suggest_names(skeleton.joint_names, joint)
             raise OptionError(f"select: no joint {joint!r}; the joints are {names}") from None
-    return sorted(kept)
+    return sorted(indices)
 
 
-def _parents(skeleton: Skeleton, kept: list[int]) -> dict[int, int]:
+def _parents(skeleton: Skeleton, indices: list[int]) -> dict[int, int]:
     """Nearest kept ancestor of each kept joint, -1 for none."""
-    among_kept, above = set(kept), {}
-    for joint in kept:
+    among_kept, above = set(indices), {}
+    for joint in indices:
         parent = skeleton.joints[joint].parent
         while parent >= 0 and parent not in among_kept:
             parent = skeleton.joints[parent].parent
@@ -196,11 +198,11 @@ def _obstacle(motion: Motion, joint: int, above: int) -> str:
     """The name of a joint in between that cannot be left out, "" if all can."""
     skeleton = motion.skeleton
     between = _between(skeleton, joint, above)
-    moving = [k for k in between if not _rests(motion, k)]
+    turning = [k for k in between if not _rests(motion, k)]
     if between and above >= 0:  # it would stretch the longer bone
         kinds = {channel.kind for channel in skeleton.joints[above].channels}
-        moving += [above] * bool(kinds & set(SCALING))
-    return skeleton.joint_names[moving[0]] if moving else ""
+        turning += [above] * bool(kinds & set(SCALING))
+    return skeleton.joint_names[turning[0]] if turning else ""
 
 
 def _rests(motion: Motion, index: int) -> bool:
@@ -234,11 +236,11 @@ STRETCHING = ("sx", "sy", "sz", "length")
 
 
 def bake_joints(
-    motion: Motion, above: Mapping[int, int], kept: list[int], selected: Skeleton, signal: Signal
+    motion: Motion, above: Mapping[int, int], indices: list[int], selected: Skeleton, signal: Signal
 ) -> tuple[Skeleton, Signal]:
     """``selected`` and ``signal`` with position and rotation channels for some joints.
 
-    ``above`` has, for every joint of ``motion`` to bake, its new parent, or -1; ``kept`` are the
+    ``above`` has, for every joint of ``motion`` to bake, its new parent, or -1; ``indices`` are the
     joints of ``selected`` as joints of ``motion``. Raises OptionError if the new parent
     stretches what is below it.
     """
@@ -254,7 +256,7 @@ def bake_joints(
         _check(skeleton, parent)
         turn = relative_turns(chain, parent, joint, turns)
         turn = np.broadcast_to(turn, (3, 3, values.shape[1]))
-        number = kept.index(joint)
+        number = indices.index(joint)
         joints[number] = _baked_joint(skeleton, joints[number], turn)
         columns[number] = np.concatenate([places[joint], _angles(selected, joints[number], turn)])
     baked = replace(selected, joints=tuple(joints))

@@ -123,11 +123,11 @@ def rest_turns(
 
     Raises OptionError for a joint that is not in ``pairs``, and for one without such a bone.
     """
-    named, turns = _numbers(target, pairs, alike), _bone_turns(target, source, pairs)
+    numbers, turns = _numbers(target, pairs, alike), _bone_turns(target, source, pairs)
     result: dict[int, Floats] = {-1: IDENTITY}
     for joint in pairs:
         result[joint] = result[nearest_above(target, joint, pairs)]
-        if joint not in named:
+        if joint not in numbers:
             continue
         turn = turns.get(joint)
         if turn is None:
@@ -179,12 +179,12 @@ def usual_alike(target: Skeleton, source: Skeleton, pairs: Mapping[int, int]) ->
     known = [joint for joint, turn in turns.items() if turn is not None]
     limbs = [j for j in known if names[j] in ours or others[pairs[j]] in theirs]
     if angles and not (ours or theirs):
-        listed = ", ".join(
+        joined = ", ".join(
             f"{names[j]} by {angles[j]:.0f} degrees" for j in list(angles)[:MOST_NAMED]
         )
         more = " ..." if len(angles) > MOST_NAMED else ""
         warnings.warn(
-            f"retarget: bones of the rest poses differ: {listed}{more}; match_rest= names those "
+            f"retarget: bones of the rest poses differ: {joined}{more}; match_rest= names those "
             "that are to point as the motion's, () accepts the difference",
             SkeletonWarning,
             stacklevel=3,

@@ -162,11 +162,11 @@ def fit_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, B
         bits, rule = ranked[rank]
         if (bits_with_exceptions(len(tokens), bits, 0), rank) >= least:
             continue
-        tried = _try_rule(tokens, rule, least[0] - bits_with_exceptions(len(tokens), bits, 0))
-        misses = len(tokens) if tried is None else len(tokens) - int(np.count_nonzero(tried[1]))
+        fit = _try_rule(tokens, rule, least[0] - bits_with_exceptions(len(tokens), bits, 0))
+        misses = len(tokens) if fit is None else len(tokens) - int(np.count_nonzero(fit[1]))
         price = bits_with_exceptions(len(tokens), bits, misses), rank
-        if tried is not None and price < least:
-            least, fewest, best = price, misses, (Grid(*rule), *tried)
+        if fit is not None and price < least:
+            least, fewest, best = price, misses, (Grid(*rule), *fit)
     return next((fitted for fitted in preferred if np.count_nonzero(~fitted[2]) <= fewest), best)
 
 

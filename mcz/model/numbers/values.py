@@ -69,8 +69,8 @@ def print_values(
     of_channels = print_rules(grids)
     out = np.empty(values.size * WIDEST + SPARE, np.uint8)
     numbers = np.asarray(values, np.float64)
-    used = token_kernels.print_rows(numbers, of_channels, TENS, POWERS, out, base, start, size)
-    return out[:used].copy()
+    n_bytes = token_kernels.print_rows(numbers, of_channels, TENS, POWERS, out, base, start, size)
+    return out[:n_bytes].copy()
 
 
 def print_rules(grids: Sequence[Grid]) -> Ints:

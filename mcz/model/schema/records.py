@@ -107,8 +107,8 @@ class RecordType(construct.Adapter):
             lines.append("    states = dict(_parsing=True, _building=False, _sizing=False)")
             lines.append("    this = Container(_=this, _params=this['_params'], **states)")
         for name, item in self.rows:
-            kept = f"{name} = this[{name!r}]" if has_context else name
-            lines.append(f"    {kept} = {item._compileparse(code)}")
+            assignment = f"{name} = this[{name!r}]" if has_context else name
+            lines.append(f"    {assignment} = {item._compileparse(code)}")
         names = ", ".join(f"{name}={name}" for name, _ in self.rows)
         lines.append(f"    return linkedinstances[{id(self)}]({names})")
         code.append("\n".join(lines))

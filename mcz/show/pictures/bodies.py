@@ -100,9 +100,9 @@ def body_of(skeleton: Skeleton) -> Body:
 
 def _heads(skeleton: Skeleton, bones: Ints, owners: Ints) -> Ints:
     """The bones that end in a head: of a row of that name the last."""
-    named = np.array(["head" in joint.name.lower() for joint in skeleton.joints], bool)[owners]
-    going_on = bones[named[bones[:, 1]], 0]
-    return np.flatnonzero(named[bones[:, 1]] & ~np.isin(bones[:, 1], going_on))
+    is_head = np.array(["head" in joint.name.lower() for joint in skeleton.joints], bool)[owners]
+    going_on = bones[is_head[bones[:, 1]], 0]
+    return np.flatnonzero(is_head[bones[:, 1]] & ~np.isin(bones[:, 1], going_on))
 
 
 def remove_false_bones(body: Body, places: Floats) -> Body:
@@ -112,7 +112,7 @@ def remove_false_bones(body: Body, places: Floats) -> Body:
     """
     if not len(body.bones):
         return body
-    low, usual, high = (_quantile(bone_lengths(body, places), q) for q in (0.1, 0.5, 0.9))
+    low, median, high = (_quantile(bone_lengths(body, places), q) for q in (0.1, 0.5, 0.9))
     parents = body.skeleton.parents
     n_joints = len(parents)
     counts = np.bincount(parents[parents >= 0], minlength=n_joints)
@@ -120,14 +120,14 @@ def remove_false_bones(body: Body, places: Floats) -> Body:
     only = (parents[starts] < 0) & (counts[starts] == 1) & (ends < n_joints)
     size = figure_size(np.delete(places, starts[only], axis=1))
     with np.errstate(invalid="ignore"):
-        rubber = (high - low > MOST_VARIATION * usual) & (usual > 0.1 * size)
-        kept = ~rubber & (usual > LEAST_LENGTH * size)
-        stem = only & (usual > STEM * size)
-    if (kept & ~stem).any():
-        kept &= ~stem
+        rubber = (high - low > MOST_VARIATION * median) & (median > 0.1 * size)
+        is_bone = ~rubber & (median > LEAST_LENGTH * size)
+        stem = only & (median > STEM * size)
+    if (is_bone & ~stem).any():
+        is_bone &= ~stem
     eyes = [_EYE.search(joint.name) is not None for joint in body.skeleton.joints]
-    kept &= ~np.array(eyes, bool)[body.joints[ends]]
-    bones = body.bones[kept]
+    is_bone &= ~np.array(eyes, bool)[body.joints[ends]]
+    bones = body.bones[is_bone]
     lone = body.lone if len(bones) else np.arange(n_joints)
     return replace(body, bones=bones, lone=lone, heads=_heads(body.skeleton, bones, body.joints))
 
@@ -158,8 +158,8 @@ def figure_size(places: Floats) -> float:
         known = frame[are_near_others(frame)]
         if len(known) > 1:
             extents.append(float((known.max(axis=0) - known.min(axis=0)).max()))
-    usual = float(np.median(extents)) if extents else 1.0
-    return usual if usual > 0 else 1.0
+    median = float(np.median(extents)) if extents else 1.0
+    return median if median > 0 else 1.0
 
 
 def are_near_others(nodes: Floats) -> Flags:
@@ -169,8 +169,8 @@ def are_near_others(nodes: Floats) -> Flags:
         return known
     with np.errstate(all="ignore"):
         apart = np.abs(nodes - np.median(nodes[known], axis=0)).max(axis=1)
-        usual = float(np.median(apart[known]))
-        return known & np.asarray(apart <= 10 * usual) if usual > 0 else known
+        median = float(np.median(apart[known]))
+        return known & np.asarray(apart <= 10 * median) if median > 0 else known
 
 
 def are_known(places: Floats) -> Flags:
@@ -253,28 +253,28 @@ class Track:
         return _blocks(self.moving, self.body, self.frames, self.up, self.scale)
 
 
-def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None) -> Track:
+def track_of(motion: MotionLike, frames: Ints, unit: str | None, up: str | None) -> Track:
     """The track of ascending frames; ``unit`` and ``up`` count if the skeleton states none.
 
     Raises MotionError if the motion has no kinematics, no joint, no frame, or no known position.
     """
-    skeleton = moving.skeleton
+    skeleton = motion.skeleton
     if not skeleton.joints or not len(frames):
-        what = "joint" if not skeleton.joints else "frame"
-        raise MotionError(f"{moving.name!r} has no {what}: nothing to draw")
+        noun = "joint" if not skeleton.joints else "frame"
+        raise MotionError(f"{motion.name!r} has no {noun}: nothing to draw")
     body = body_of(skeleton)
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, SAMPLES).astype(np.int64))]
     unit_cm = skeleton.unit_cm or (unit and unit_cm_of(unit))
     scale = unit_cm or 1.0
-    seen = np.concatenate([p for _, p in _blocks(moving, body, chosen, "z", scale)])
-    if not are_known(seen).any():
-        raise unknown(moving)
-    axis = skeleton.up_axis or up or guess_up_axis(body, seen)
-    seen = _turn_upright(seen, axis)
-    body = remove_false_bones(body, seen)
-    size = figure_size(seen[:, body.drawn_nodes])
+    visible = np.concatenate([p for _, p in _blocks(motion, body, chosen, "z", scale)])
+    if not are_known(visible).any():
+        raise unknown(motion)
+    axis = skeleton.up_axis or up or guess_up_axis(body, visible)
+    visible = _turn_upright(visible, axis)
+    body = remove_false_bones(body, visible)
+    size = figure_size(visible[:, body.drawn_nodes])
     track = Track(
-        moving=moving,
+        moving=motion,
         body=body,
         frames=frames,
         up=axis,
@@ -282,24 +282,24 @@ def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None)
         scale=scale,
         unit="cm" if unit_cm else "units",
         size=size,
-        radii=radii(body, seen, size),
+        radii=radii(body, visible, size),
         floor=0.0,
-        forward=facing(body, seen),
+        forward=facing(body, visible),
         centers=np.empty((0, 3)),
     )
     return _measure_track(track)
 
 
-def unknown(moving: MotionLike) -> MotionError:
-    return MotionError("no position is known in these frames: nothing to draw", clip=moving.name)
+def unknown(motion: MotionLike) -> MotionError:
+    return MotionError("no position is known in these frames: nothing to draw", clip=motion.name)
 
 
 def _measure_track(track: Track) -> Track:
     """``track`` with its floor and its centers, from one pass over all frames."""
-    shown = track.body.drawn_nodes
+    drawn = track.body.drawn_nodes
     lows, centers = [], []
     for _, places in track.blocks():
-        for nodes in places[:, shown]:
+        for nodes in places[:, drawn]:
             known = nodes[are_near_others(nodes)]
             lows.append(known[:, 2].min() if len(known) else np.nan)
             centers.append(
@@ -312,25 +312,25 @@ def _measure_track(track: Track) -> Track:
     middles = np.array(centers).reshape(-1, 3)
     if not are_known(middles).any():
         raise unknown(track.moving)
-    usual = np.median(middles[are_known(middles)], axis=0)
+    center = np.median(middles[are_known(middles)], axis=0)
     with np.errstate(invalid="ignore"):
-        middles[~(np.abs(middles - usual).max(axis=1) <= MOST_SIZES * track.size)] = np.nan
+        middles[~(np.abs(middles - center).max(axis=1) <= MOST_SIZES * track.size)] = np.nan
     return replace(track, floor=low, centers=middles)
 
 
 def _blocks(
-    moving: MotionLike, body: Body, frames: Ints, up: str, scale: float
+    motion: MotionLike, body: Body, frames: Ints, up: str, scale: float
 ) -> Iterator[tuple[Ints, Floats]]:
-    skeleton = moving.skeleton
+    skeleton = motion.skeleton
     width = max(1, skeleton.n_channels + 12 * skeleton.n_joints)
     longest = max(1, min(MOST_LEAD, BLOCK // width))
     every = range(skeleton.n_joints)
-    per_frame = _samples_per_frame(moving)
+    per_frame = _samples_per_frame(motion)
     at = 0
     while at < len(frames):
         stop = max(at + 1, int(np.searchsorted(frames, frames[at] + longest)))
         first, last = int(frames[at]), int(frames[stop - 1]) + 1
-        values = values_of(moving, (first, last), every)[::per_frame][frames[at:stop] - first]
+        values = values_of(motion, (first, last), every)[::per_frame][frames[at:stop] - first]
         places = _turn_upright(body.places(values), up)
         with np.errstate(all="ignore"):
             places *= scale
@@ -345,8 +345,8 @@ def _turn_upright(places: Floats, up: str) -> Floats:
     return turned_places
 
 
-def _samples_per_frame(moving: MotionLike) -> int:
-    signal: Any = moving.signals[0]  # of a Motion, or the facts of a Clip
+def _samples_per_frame(motion: MotionLike) -> int:
+    signal: Any = motion.signals[0]  # of a Motion, or the facts of a Clip
     return int(getattr(signal, "samples_per_frame", 0) or signal.layout.samples_per_frame)
 
 

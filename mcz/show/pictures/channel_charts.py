@@ -174,24 +174,24 @@ def _columns(
         return list(range(len(labels)))[:MOST_SERIES], (more,) * (len(labels) > MOST_SERIES)
     for name in names:
         if name not in labels:
-            shown = suggest_names(labels, name)
-            raise OptionError(f"signal {signal!r} has no channel {name!r}, but {shown}")
+            labelled = suggest_names(labels, name)
+            raise OptionError(f"signal {signal!r} has no channel {name!r}, but {labelled}")
     return [labels.index(name) for name in names], ()
 
 
 def channel_chart(motion: Motion, selection: Selection, first: int = 0) -> Chart:
     """Channels over time; ``first`` is the frame of the clip where the motion begins."""
-    shown = _chart_data(motion, selection, first)
+    data = _chart_data(motion, selection, first)
     rows: list[list[object]] = [["channel", "in", "least", "mean", "greatest", "unknown"]]
-    for each in shown.series:
+    for each in data.series:
         known = each.numbers[np.isfinite(each.numbers)]
         with np.errstate(over="ignore"):
             figures = (known.min(), known.mean(), known.max()) if len(known) else (None,) * 3
         rows.append([each.label, each.unit, *figures, len(each.numbers) - len(known)])
     table = Sheet("Channels", rows_of(rows), "llrrrr")
-    size = WIDTH, 60 + PANEL * len({each.unit for each in shown.series})
-    draw = partial(_draw_channels, shown=shown)
-    return Chart(f"{motion.name}: {shown.name}, channels", size, draw, (table,), shown.notes)
+    size = WIDTH, 60 + PANEL * len({each.unit for each in data.series})
+    draw = partial(_draw_channels, data=data)
+    return Chart(f"{motion.name}: {data.name}, channels", size, draw, (table,), data.notes)
 
 
 def _panels(
@@ -207,10 +207,10 @@ def _panels(
         legend(axes, theme, loc="upper right", ncols=len(own))
 
 
-def _draw_channels(figure: Figure, theme: Theme, *, shown: _ChartData) -> None:
-    for axes, own in _panels(figure, theme, shown.series, shown.when, "{unit}"):
+def _draw_channels(figure: Figure, theme: Theme, *, data: _ChartData) -> None:
+    for axes, own in _panels(figure, theme, data.series, data.when, "{unit}"):
         for place, each in enumerate(own):
-            draw_runs(axes, (each.at, each.numbers), shown.runs, _color(theme, place), each.label)
+            draw_runs(axes, (each.at, each.numbers), data.runs, _color(theme, place), each.label)
 
 
 def draw_runs(
@@ -244,8 +244,8 @@ def spectrum_chart(motion: Motion, selection: Selection) -> Chart:
         notes = (f"frames {start}:{stop} alone, the longest part without a gap",)
         motion = motion.cut(start, stop)
     if motion.n_frames < LEAST_FRAMES:
-        what = f"a spectrum of {motion.n_frames} frames"
-        raise MotionError(f"{what}; {LEAST_FRAMES} are needed", clip=motion.name)
+        label = f"a spectrum of {motion.n_frames} frames"
+        raise MotionError(f"{label}; {LEAST_FRAMES} are needed", clip=motion.name)
     period = None if motion.timeline is None else motion.timeline.period
     turned = motion
     if motion.signals[0].has_poses and motion.skeleton.n_channels:
@@ -253,21 +253,21 @@ def spectrum_chart(motion: Motion, selection: Selection) -> Chart:
         values = Unwrapper(motion.skeleton)(np.asarray(first.masked(), np.float64))
         mended = Signal(values, name=first.name, samples_per_frame=first.samples_per_frame)
         turned = replace(motion, signals=(mended, *motion.signals[1:]), source=None)
-    shown = _chart_data(turned, selection, 0)
-    rate = shown.per_frame / (period or 1.0)
-    given = [*shown.series, *([] if shown.joint is None else _speed(motion, shown.joint))]
-    series = [spectrum for each in given if (spectrum := _spectrum(each, rate)) is not None]
+    data = _chart_data(turned, selection, 0)
+    rate = data.per_frame / (period or 1.0)
+    sources = [*data.series, *([] if data.joint is None else _speed(motion, data.joint))]
+    series = [spectrum for each in sources if (spectrum := _spectrum(each, rate)) is not None]
     if not series:
-        raise MotionError(f"{shown.name!r} has only invalid values", clip=motion.name)
+        raise MotionError(f"{data.name!r} has only invalid values", clip=motion.name)
     per = "cycles a frame" if period is None else "Hz"
-    heads = [f"{what}, {per}" for what in ("strongest", "half below", "99 % below")]
+    heads = [f"{label}, {per}" for label in ("strongest", "half below", "99 % below")]
     rows: list[list[object]] = [["of", "in", *heads]]
     rows += [[each.label, each.unit, *_marks(each.at, each.numbers)] for each in series]
     table = Sheet("Frequencies", rows_of(rows), "llrrr", "Half, and 99 %, of the power is below.")
     size = WIDTH, 60 + PANEL * len({each.unit for each in series})
     draw = partial(_draw_spectra, series=series, per=per)
-    title = f"{motion.name}: {shown.name}, spectrum"
-    return Chart(title, size, draw, (table,), (*shown.notes, *notes))
+    title = f"{motion.name}: {data.name}, spectrum"
+    return Chart(title, size, draw, (table,), (*data.notes, *notes))
 
 
 def _spectrum(series: _Series, rate: float) -> _Series | None:

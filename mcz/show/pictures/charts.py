@@ -125,9 +125,9 @@ def legend(axes: Axes, theme: Theme, **options: Any) -> None:
 
 def name_ticks(axes: Axes, places: ArrayLike, names: Sequence[str], most: int) -> None:
     """Names of bars at their places, long ones cut, not parsed as mathematics."""
-    shown = [printable(name) for name in names]
-    shown = [name if len(name) <= most else f"{name[: most - 1]}…" for name in shown]
-    for tick in axes.set_yticks(places, shown):
+    labels = [printable(name) for name in names]
+    labels = [name if len(name) <= most else f"{name[: most - 1]}…" for name in labels]
+    for tick in axes.set_yticks(places, labels):
         tick.label1.set_parse_math(False)
     axes.grid(False, axis="y")
 
@@ -245,7 +245,7 @@ class ChartPage:
         style = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode("ascii")
         policy = POLICY.format(style=f"sha256-{style}")
         notes = "".join(f"<li>{_text(note)}</li>" for note in self.notes)
-        listed = f"<ul>{notes}</ul>" if notes else ""
+        items = f"<ul>{notes}</ul>" if notes else ""
         contents = ""
         if len(self.headings) > 3:
             links = (
@@ -259,7 +259,7 @@ class ChartPage:
             f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
             '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
             f"<title>{_text(self.title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
-            f"<h1>{_text(self.title)}</h1>\n{listed}{contents}\n{body}\n</main>\n</body>\n</html>\n"
+            f"<h1>{_text(self.title)}</h1>\n{items}{contents}\n{body}\n</main>\n</body>\n</html>\n"
         ).encode("utf-8", "backslashreplace")
 
 

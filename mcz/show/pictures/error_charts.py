@@ -202,16 +202,16 @@ def _draw_bars(axes: Axes, theme: Theme, errors: Errors) -> None:
     known = [each for each in errors.joints if each[1] is not None and each[2] is not None]
     known.sort(key=lambda each: each[1] or 0.0, reverse=True)
     more = len(known) - MOST_BARS
-    shown = known[:MOST_BARS][::-1]
+    bars = known[:MOST_BARS][::-1]
     title = "by joint: mean, and a line to the greatest"
     title += f" ({more} with less left out)" if more > 0 else ""
     style(axes, theme, x=errors.unit, title=title)
-    places = np.arange(len(shown))
-    means, most = (np.array([each[k] for each in shown], float) for k in (1, 2))
+    places = np.arange(len(bars))
+    means, most = (np.array([each[k] for each in bars], float) for k in (1, 2))
     axes.barh(places, means, color=theme.series[0], height=0.68)
     axes.hlines(places, means, most, color=theme.series[1], linewidth=1.2)
     axes.plot(most, places, "|", color=theme.series[1], markersize=6)
-    name_ticks(axes, places, [each[0] for each in shown], 20)
+    name_ticks(axes, places, [each[0] for each in bars], 20)
     axes.set_xlim(left=0)
 
 

@@ -103,14 +103,14 @@ def _draw_bars(
 
 
 def _with_rest(ordered: Sequence[tuple[str, Parts]]) -> list[tuple[str, Parts]]:
-    shown, rest = list(ordered[:MOST_BARS]), ordered[MOST_BARS:]
+    bars, rest = list(ordered[:MOST_BARS]), ordered[MOST_BARS:]
     if rest:
         sums: Parts = {}
         for _, own in rest:
             for sort, size in own.items():
                 sums[sort] = sums.get(sort, 0) + size
-        shown.append((f"{len(rest)} others", sums))
-    return shown
+        bars.append((f"{len(rest)} others", sums))
+    return bars
 
 
 def _ramp(theme: Theme, sorts: Sequence[Sort]) -> dict[Sort, Any]:
@@ -163,9 +163,9 @@ def rate_chart(
 
 
 def _report_setting(
-    progress: Callable[[int, int, str], None], place: int, count: int, step: int, what: str
+    progress: Callable[[int, int, str], None], place: int, count: int, step: int, name: str
 ) -> None:
-    progress(place * len(STEPS) + step, count * len(STEPS), what)
+    progress(place * len(STEPS) + step, count * len(STEPS), name)
 
 
 def _draw_rates(
@@ -244,7 +244,7 @@ class Plotted:
 
 
 def plot(
-    moving: MotionLike,
+    motion: MotionLike,
     path: str | os.PathLike[str],
     what: str | None = None,
     *,
@@ -266,7 +266,7 @@ def plot(
 
     ``what``: "channels" of ``joint`` over time (None: of the first that has any), or of another
     ``signal``, such as "analog", by their names in ``channels``; their "spectrum", the "error" of
-    ``other`` against ``moving`` (the default if it is given), the "bytes" of a clip by joint and
+    ``other`` against ``motion`` (the default if it is given), the "bytes" of a clip by joint and
     resolution, or "rate-distortion" at a few settings of lossy ``codecs``. Only ``frames`` (a, b)
     are drawn; ``rate``, ``unit`` and ``up`` are for motions that state none. A page has both
     themes. Raises OptionError, MotionError, ExistsError.
@@ -283,10 +283,10 @@ def plot(
         one = next(each for each in (joint, signal, names) if each is not None)
         raise OptionError(f"a plot of {what} shows all joints, so {one!r} cannot be chosen")
     size = check_size(size)
-    cut = frame_range(moving, frames)
+    cut = frame_range(motion, frames)
     facts = SourceOptions(rate=rate, unit=unit, up=up)
     chart = _chart(
-        moving, what, other, selection, cut, codecs, facts, progress or (lambda *_: None)
+        motion, what, other, selection, cut, codecs, facts, progress or (lambda *_: None)
     )
     save(chart, path, theme=theme, size=size, force=force)
     tables = tuple(tuple(map(tuple, table.rows)) for table in chart.tables)
@@ -294,8 +294,8 @@ def plot(
 
 
 def _chart(
-    moving: MotionLike,
-    what: str,
+    subject: MotionLike,
+    kind: str,
     other: MotionLike | None,
     selection: Selection,
     cut: tuple[int, int],
@@ -303,27 +303,27 @@ def _chart(
     facts: SourceOptions,
     progress: Progress,
 ) -> Chart:
-    if what == "bytes":
-        if not isinstance(moving, Clip):
-            raise OptionError("a plot of bytes needs an .mcz", clip=moving.name)
-        return bytes_chart(moving)
-    motion = _motion(moving, cut, facts)
+    if kind == "bytes":
+        if not isinstance(subject, Clip):
+            raise OptionError("a plot of bytes needs an .mcz", clip=subject.name)
+        return bytes_chart(subject)
+    motion = _motion(subject, cut, facts)
     if other is not None:
-        theirs = _motion(other, cut if other.n_frames == moving.n_frames else None, facts)
+        theirs = _motion(other, cut if other.n_frames == subject.n_frames else None, facts)
         return error_chart(motion, theirs, facts.up, cut[0])
-    if what == "rate-distortion":
+    if kind == "rate-distortion":
         return rate_chart(motion, codecs, progress)
-    if what == "spectrum":
+    if kind == "spectrum":
         return spectrum_chart(motion, selection)
     return channel_chart(motion, selection, cut[0])
 
 
-def _motion(moving: MotionLike, cut: tuple[int, int] | None, facts: SourceOptions) -> Motion:
-    if isinstance(moving, Motion):
-        motion = moving
-        if cut is not None and cut != (0, moving.n_frames):
-            motion = moving.cut(*cut)
+def _motion(subject: MotionLike, cut: tuple[int, int] | None, facts: SourceOptions) -> Motion:
+    if isinstance(subject, Motion):
+        motion = subject
+        if cut is not None and cut != (0, subject.n_frames):
+            motion = subject.cut(*cut)
     else:
-        clip: Any = moving
+        clip: Any = subject
         motion = clip.motion(cut)
     return facts.completing(motion)

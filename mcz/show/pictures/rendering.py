@@ -69,7 +69,7 @@ class Look:
 
 
 def render(
-    moving: MotionLike,
+    motion: MotionLike,
     path: str | os.PathLike[str],
     *,
     frames: Frames = None,
@@ -101,23 +101,25 @@ def render(
     suffix = _checked_suffix(path, sheet)
     look = Look(view, theme_of(theme), check_size(size), follow)
     notes: list[str] = []
-    if has_no_lengths(moving.skeleton):
+    if has_no_lengths(motion.skeleton):
         notes.append(f"{NO_LENGTHS}: all joints lie at the root until rest offsets are set")
-    timeline = _timeline(moving, rate)
-    first, stop = frame_range(moving, frames)
+    timeline = _timeline(motion, rate)
+    first, stop = frame_range(motion, frames)
     if first == stop:
-        raise MotionError(f"{moving.name!r} has none of these frames: nothing to draw")
+        raise MotionError(f"{motion.name!r} has none of these frames: nothing to draw")
     report = progress or (lambda *_: None)
-    job = _Job(moving, path, look, timeline, (unit, up), force, report, notes)
+    job = _Job(motion, path, look, timeline, (unit, up), force, report, notes)
     if suffix in FILMS:
         film_rate = _fps(fps, FILMS[suffix])
         if timeline is None:
             text = f"its frame rate is unknown: {USUAL_RATE} a second assumed"
             notes.append(Remark(text, Hint.RATE))
-            shown = film_frames(first, stop, USUAL_RATE, film_rate, speed)
+            frames_shown = film_frames(first, stop, USUAL_RATE, film_rate, speed)
         else:
-            shown = first + _frames_by_time(timeline.cut(slice(first, stop)), film_rate, speed)
-        return job.film(shown, film_rate, suffix)
+            frames_shown = first + _frames_by_time(
+                timeline.cut(slice(first, stop)), film_rate, speed
+            )
+        return job.film(frames_shown, film_rate, suffix)
     if sheet is not None:
         return job.sheet(np.linspace(first, stop - 1, sheet).round().astype(np.int64))
     return job.still(np.array([(first + stop - 1) // 2], np.int64))
@@ -172,18 +174,18 @@ def _frames_by_time(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
     places = np.rint((timeline.regular_times - timeline.regular_times[0]) / period)
     rate, known = Fraction(1 / period).limit_denominator(2**20), timeline.rate
     rate = known if known and abs(float(known) * period - 1) < 1e-6 else rate or Fraction(1, 2**20)
-    shown = film_frames(0, int(places[-1]) + 1, rate, fps, speed)
-    return np.asarray(np.searchsorted(places, shown, side="right") - 1, np.int64)
+    frames = film_frames(0, int(places[-1]) + 1, rate, fps, speed)
+    return np.asarray(np.searchsorted(places, frames, side="right") - 1, np.int64)
 
 
-def _timeline(moving: MotionLike, rate: float | Fraction | None) -> Timeline | None:
+def _timeline(motion: MotionLike, rate: float | Fraction | None) -> Timeline | None:
     """The times of frames, at the motion's or else the caller's rate; None while unknown."""
-    if moving.timeline is not None or rate is None:
-        return moving.timeline
+    if motion.timeline is not None or rate is None:
+        return motion.timeline
     if not 0 < rate < np.inf:
         raise OptionError(f"frame rate {rate} must be positive")
     known = Fraction(rate).limit_denominator(2**20) or Fraction(1, 2**20)
-    return Timeline(np.arange(moving.n_frames) / float(known), known)
+    return Timeline(np.arange(motion.n_frames) / float(known), known)
 
 
 def _fps(fps: float | Fraction | None, usual: Fraction) -> Fraction:
@@ -212,14 +214,14 @@ class _Job:
         stage = self._stage(frames, width, height, float(fps))
         canvas = Canvas(width, height, self.look.theme)
         with replacing(self.path, force=self.force) as stream:
-            with film(stream, suffix[1:], width, height, fps) as taken:
+            with film(stream, suffix[1:], width, height, fps) as add_frame:
                 for number, (frame, nodes) in enumerate(stage.track):
                     self.progress(number, len(frames), f"frame {frame}")
                     words = label_texts(
                         stage, width, height, self.moving.name, self._time_text(frame)
                     )
                     canvas.draw(drawing_of(stage, number, nodes, words))
-                    taken.add(canvas.pixels())
+                    add_frame.add(canvas.pixels())
             size = stream.tell()
         return self._rendered(size, len(frames), width, height, float(fps))
 

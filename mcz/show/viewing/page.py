@@ -209,31 +209,31 @@ def write_page(
     The page is complete under the target's name, or not there. Raises LimitError if it would have
     more than ``most`` bytes, and MczError for files that cannot be read, cut or coded so.
     """
-    given = [file for _, file in registry.initial_files()]
-    inputs = [file.source for file in given]
+    initial = [file for _, file in registry.initial_files()]
+    inputs = [file.source for file in initial]
     with replacing(target, force=force, inputs=inputs) as stream, ExitStack() as stack:
         contents, left = {}, most
-        for number, file in enumerate(given):
+        for number, file in enumerate(initial):
             data = _bytes_of(file, registry, options, left)
             left -= len(data) * 4 // 3
             contents[number] = data, stack.enter_context(_file(data, options.max_decoded))
         files = [file for _, file in contents.values()]
         document: JsonObject = {
             "files": [
-                {"name": given[number].name, "base64": base64.b64encode(data).decode()}
+                {"name": initial[number].name, "base64": base64.b64encode(data).decode()}
                 for number, (data, _) in contents.items()
             ],
             "annex": deflate_annexes(set().union(*map(tables_for, files))),
         }
         if len(files) > 1:
-            names = [file.name for file in given]
+            names = [file.name for file in initial]
             document["diffs"] = list(_differences(files, names, registry))
         whole = (page.before + element(document) + page.after).encode()
         if len(whole) > most:
-            raise _too_large(given[-1].name, most)
+            raise _too_large(initial[-1].name, most)
         stream.write(whole)
         entries = (
-            Embedded(given[n].name, file.size, len(file)) for n, (_, file) in contents.items()
+            Embedded(initial[n].name, file.size, len(file)) for n, (_, file) in contents.items()
         )
         return PageWritten(len(whole), len(page.text.encode()), tuple(entries))
 

@@ -37,38 +37,38 @@ UNKNOWN_RATE = 30.0  # frames a second of a motion without a rate
 PLACE = "/*data*/null"
 
 
-def player(moving: Moving) -> str:
+def player(motion: Moving) -> str:
     """The HTML of a Motion or Clip; if it cannot be drawn, its summary and the reason."""
     try:
-        return _player(moving)
+        return _player(motion)
     except MczError as error:
         why = reason_of(error)[:300]
-        return f"<pre>{html.escape(repr(moving))}\n{html.escape(why)}</pre>"
+        return f"<pre>{html.escape(repr(motion))}\n{html.escape(why)}</pre>"
 
 
-def _player(moving: Moving) -> str:
-    lines = figure(moving.skeleton)
-    if not moving.n_frames:
-        return f"<pre>{html.escape(repr(moving))}</pre>"
-    rate = float(moving.frame_rate or UNKNOWN_RATE)
+def _player(motion: Moving) -> str:
+    lines = figure(motion.skeleton)
+    if not motion.n_frames:
+        return f"<pre>{html.escape(repr(motion))}</pre>"
+    rate = float(motion.frame_rate or UNKNOWN_RATE)
     n_points = len(lines.sides)
     nothing = np.empty((0, n_points, 3), "<i2")
-    empty = PointSamples(nothing, 1.0, frames_read(moving), frames_read(moving), 0, 0.0, 0.0)
-    room = MOST_BYTES - SPARE - len(_frame(moving, lines, empty, rate))
+    empty = PointSamples(nothing, 1.0, frames_read(motion), frames_read(motion), 0, 0.0, 0.0)
+    room = MOST_BYTES - SPARE - len(_frame(motion, lines, empty, rate))
     most = room * 3 // 4 // (6 * n_points + TIME_BYTES)
-    drawing = sample_points(moving, max(1, most), max(1, int(rate // RATE)))
-    return _frame(moving, lines, drawing, rate)
+    drawing = sample_points(motion, max(1, most), max(1, int(rate // RATE)))
+    return _frame(motion, lines, drawing, rate)
 
 
-def _frame(moving: Moving, lines: Figure, drawing: PointSamples, rate: float) -> str:
+def _frame(motion: Moving, lines: Figure, drawing: PointSamples, rate: float) -> str:
     document = {
-        "caption": _caption(moving, drawing),
+        "caption": _caption(motion, drawing),
         "positions": base64.b64encode(drawing.words.tobytes()).decode(),
         "frames": len(drawing.words),
         "every": drawing.every,
-        "total": moving.n_frames,
+        "total": motion.n_frames,
         "rate": rate / drawing.every,
-        "times": _times(moving, drawing),
+        "times": _times(motion, drawing),
         "step": drawing.step,
         "bones": lines.bones,
         "sides": lines.sides,
@@ -84,19 +84,19 @@ def _frame(moving: Moving, lines: Figure, drawing: PointSamples, rate: float) ->
     )
 
 
-def _times(moving: Moving, drawing: PointSamples) -> list[float] | None:
+def _times(motion: Moving, drawing: PointSamples) -> list[float] | None:
     """The times of the drawn frames to a millisecond, None if they are unknown."""
-    if moving.timeline is None:
+    if motion.timeline is None:
         return None
-    times = moving.timeline.times[:: drawing.every][: len(drawing.words)]
+    times = motion.timeline.times[:: drawing.every][: len(drawing.words)]
     return [round(float(time), 3) for time in times]
 
 
-def _caption(moving: Moving, drawing: PointSamples) -> str:
-    rate = moving.frame_rate
-    text = f"{quote_name(moving.name)}: {count_text(moving.n_frames, 'frame')}"
+def _caption(motion: Moving, drawing: PointSamples) -> str:
+    rate = motion.frame_rate
+    text = f"{quote_name(motion.name)}: {count_text(motion.n_frames, 'frame')}"
     text += " at an unknown rate" if rate is None else f" at {float(rate):g} Hz"
-    if drawing.n_read < moving.n_frames:
+    if drawing.n_read < motion.n_frames:
         text += f"; frames 0 to {drawing.n_read - 1} are shown"
     if drawing.every > 1:
         text += f"; one frame in {drawing.every} is drawn"
@@ -154,15 +154,15 @@ def figure(skeleton: Skeleton) -> Figure:
     return Figure(lines_of(skeleton), [sides[joint] for joint, _ in points])
 
 
-def sample_points(moving: Moving, most_frames: int, every: int = 1) -> PointSamples:
+def sample_points(motion: Moving, most_frames: int, every: int = 1) -> PointSamples:
     """At most ``most_frames`` frames of a Motion or Clip; raises MczError for one without points.
 
     ``every`` is the least distance of two of them.
     """
-    skeleton = moving.skeleton
-    n_read = frames_read(moving)
+    skeleton = motion.skeleton
+    n_read = frames_read(motion)
     every = max(every, -(-n_read // max(1, most_frames)))
-    places = positions_of(skeleton, _values(moving, n_read, every))
+    places = positions_of(skeleton, _values(motion, n_read, every))
     places[~(np.abs(places) < FARTHEST).all(axis=2)] = np.nan
     axis = skeleton.up_axis or "y"
     places *= signs_of(axis)
@@ -175,25 +175,25 @@ def sample_points(moving: Moving, most_frames: int, every: int = 1) -> PointSamp
     )
 
 
-def frames_read(moving: Moving) -> int:
+def frames_read(motion: Moving) -> int:
     """Number of frames that are used: of a clip, which must be decoded, the first of many."""
-    if isinstance(moving, Motion):
-        return moving.n_frames
-    return min(moving.n_frames, MOST_READ, MOST_NUMBERS // max(1, moving.n_channels) + 1)
+    if isinstance(motion, Motion):
+        return motion.n_frames
+    return min(motion.n_frames, MOST_READ, MOST_NUMBERS // max(1, motion.n_channels) + 1)
 
 
-def _values(moving: Moving, n_read: int, every: int) -> NDArray[np.float64]:
+def _values(motion: Moving, n_read: int, every: int) -> NDArray[np.float64]:
     """Every n-th frame, (n, n_channels), NaN where invalid."""
-    if not moving.signals[0].has_poses:
+    if not motion.signals[0].has_poses:
         raise MotionError(
-            "the channels of its motion signal differ from those of its skeleton", clip=moving.name
+            "the channels of its motion signal differ from those of its skeleton", clip=motion.name
         )
-    if isinstance(moving, Motion):
-        signal = moving.signals[0]
+    if isinstance(motion, Motion):
+        signal = motion.signals[0]
         values = np.asarray(signal.values[:n_read:every], np.float64)
         valid = None if signal.mask is None else signal.mask[:n_read:every]
         return values if valid is None else np.where(valid, values, np.nan)
-    return np.asarray(moving.read((0, n_read))[::every], np.float64)
+    return np.asarray(motion.read((0, n_read))[::every], np.float64)
 
 
 def _words(places: NDArray[np.float64]) -> tuple[Words, float, NDArray[np.float64]]:

@@ -136,10 +136,10 @@ def object_of(document: Params, key: str) -> JsonObject:
 
 def params_of(document: Params) -> JsonObject:
     """The parameters of a codec by name: texts, numbers and truths, no null; raises Refused."""
-    given = document.get("params") or {}
-    if not isinstance(given, dict) or len(given) > MOST_PARAMS:
+    stated = document.get("params") or {}
+    if not isinstance(stated, dict) or len(stated) > MOST_PARAMS:
         raise Refused(400, "params must be an object of parameters")
-    params = {key: value for key, value in given.items() if value is not None}
+    params = {key: value for key, value in stated.items() if value is not None}
     for key, value in params.items():
         if not isinstance(value, str | int | float | bool):
             raise Refused(400, f"parameter {key[:40]!r} must be a string or a number")
@@ -235,8 +235,8 @@ class _Body:
     def take(self, size: int) -> bytes:
         while len(self._held) < size:
             self._read_more()
-        taken, self._held = self._held[:size], self._held[size:]
-        return taken
+        data, self._held = self._held[:size], self._held[size:]
+        return data
 
     def head(self) -> bytes:
         """The headers of a part, up to the empty line."""

@@ -122,17 +122,17 @@ class ServerTasks:
         number, stored = self._registry.upload(name, kind, make)
         return {"url": url_of(number), "name": name, "size": stored.size}
 
-    def encode(self, asked: Params) -> JsonObject:
+    def encode(self, request: Params) -> JsonObject:
         """Encode a clip again with a codec and its parameters; report the result."""
         from mcz.codecs import codec_by_name
         from mcz.files.reading.sizes import clip_sizes
         from mcz.files.writing.file import write
 
-        codec, params = text_of(asked, "codec"), params_of(asked)
+        codec, params = text_of(request, "codec"), params_of(request)
         codec_by_name(codec).options(params)
         refuse_files(params)
-        unit = None if asked.get("unit") is None else text_of(asked, "unit")
-        motion = SourceOptions(unit=unit).applied_to(self._motion(asked))
+        unit = None if request.get("unit") is None else text_of(request, "unit")
+        motion = SourceOptions(unit=unit).applied_to(self._motion(request))
         quality: dict[str, str] = {}
 
         def make(out: BinaryIO) -> None:
@@ -153,13 +153,13 @@ class ServerTasks:
             "seconds": round(seconds, 3),
         }
 
-    def diff(self, asked: Params) -> JsonObject:
+    def diff(self, request: Params) -> JsonObject:
         """Compare two clips, as ``mcz diff --by-joint --json`` does."""
         from mcz.files.reading.differences import document_of
         from mcz.files.reading.sizes import clip_ratios
         from mcz.kinematics.metrics.diff_document import diff_document
 
-        sides = [object_of(asked, key) for key in "ab"]
+        sides = [object_of(request, key) for key in "ab"]
         ratios = []
         for side in sides:
             with self._open_clip(side) as (file, clip):
@@ -172,26 +172,26 @@ class ServerTasks:
         names = [self._file(side).name for side in sides]
         return {"a": names[0], "b": names[1], "clips": [document]}
 
-    def glb(self, asked: Params) -> bytes:
+    def glb(self, request: Params) -> bytes:
         """A clip as the bytes of a GLB."""
         writer = glb_writer()
         if writer is None:
             raise Refused(501, "this version writes no GLB")
-        rate = asked.get("rate")
-        data: bytes = writer(self._motion(asked), rate=rate).data
+        rate = request.get("rate")
+        data: bytes = writer(self._motion(request), rate=rate).data
         return data
 
-    def _file(self, asked: Params) -> RegisteredFile:
-        match = re.fullmatch(r"files/([0-9]{1,9})", text_of(asked, "url"))
+    def _file(self, request: Params) -> RegisteredFile:
+        match = re.fullmatch(r"files/([0-9]{1,9})", text_of(request, "url"))
         try:
             return self._registry[int(match[1]) if match else -1]
         except KeyError:
             raise Refused(404, "no such file") from None
 
     @contextmanager
-    def _open_clip(self, asked: Params) -> Iterator[tuple[File, Clip]]:
-        clip_key = asked.get("clip")
-        with mcz_open(self._file(asked).target(), salvage=self._registry.salvage) as file:
+    def _open_clip(self, request: Params) -> Iterator[tuple[File, Clip]]:
+        clip_key = request.get("clip")
+        with mcz_open(self._file(request).target(), salvage=self._registry.salvage) as file:
             if isinstance(clip_key, int) and not isinstance(clip_key, bool):
                 if not 0 <= clip_key < len(file):
                     raise Refused(
@@ -203,15 +203,15 @@ class ServerTasks:
             else:
                 raise Refused(400, "clip must be a name or a number")
 
-    def _motion(self, asked: Params) -> Motion:
+    def _motion(self, request: Params) -> Motion:
         """The motion of a clip; the last decoded ones are cached."""
-        file = self._file(asked)
+        file = self._file(request)
         with closing(file.open()) as contents:
-            key = (asked["url"], contents.tag, asked.get("clip"))
+            key = (request["url"], contents.tag, request.get("clip"))
         for cached_key, motion in self._cached:
             if cached_key == key:
                 return motion
-        with self._open_clip(asked) as (_, clip):
+        with self._open_clip(request) as (_, clip):
             motion = clip.motion()
         motion = self._registry.with_facts(motion)
         if sum(signal.values.nbytes for signal in motion.signals) <= CACHED_BYTES:

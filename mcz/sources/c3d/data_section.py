@@ -211,10 +211,10 @@ def _notes(
         ("analog samples a frame", [order.integer(data, 4)], shape.n_channels * shape.subframes),
         ("analog channels", [parameters.count("ANALOG", "USED")], shape.n_channels),
     )
-    for what, stated, actual in words:
+    for noun, stated, actual in words:
         wrong = [number for number in stated if number is not None and number != actual]
         if wrong:
-            yield f"{wrong[0]} {what} are declared, {actual} are taken"
+            yield f"{wrong[0]} {noun} are declared, {actual} are taken"
     scale, own = order.real(data, 12), parameters.number("POINT", "SCALE")
     if own is not None and not np.isclose(scale, own, rtol=1e-6, atol=0):
         yield f"the scale is {scale:.9g} in the header, {own:.9g} in POINT:SCALE"

@@ -174,10 +174,10 @@ def decode_texts(texts: list[bytes]) -> tuple[list[str], str]:
         return [text.decode("latin-1") for text in texts], "latin-1"
 
 
-def names_of(labels: list[str], n: int, what: str) -> list[str]:
-    """``n`` names: the labels, and ``what`` with a number from 1 for those that lack one."""
+def names_of(labels: list[str], n: int, noun: str) -> list[str]:
+    """``n`` names: the labels, and ``noun`` with a number from 1 for those that lack one."""
     labels = labels[:n] + [""] * (n - len(labels))
-    return [label or f"{what} {number}" for number, label in enumerate(labels, 1)]
+    return [label or f"{noun} {number}" for number, label in enumerate(labels, 1)]
 
 
 def find_parameters(data: bytes) -> tuple[ByteOrder, int]:

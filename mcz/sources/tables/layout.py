@@ -209,12 +209,12 @@ def parse_sections(template: bytes, detail: bytes, sizes: Sequence[int]) -> list
     return [_section(*fields, sizes) for fields in zip(shared, own, strict=False)]
 
 
-def _section(shared: SectionFields, own: Detail, sizes: Sequence[int]) -> Section:
+def _section(shared: SectionFields, detail: Detail, sizes: Sequence[int]) -> Section:
     if not shared.signals:  # TABLE-08
         raise FormatError("source template: a section without signals")
     clock = parsed_clock(shared)
     n_columns = sum(sizes[number] for number in shared.signals) + 1 + bool(shared.clock)  # TABLE-01
-    rows = parsed_patterns((shared.header,), shared, own, n_columns)
+    rows = parsed_patterns((shared.header,), shared, detail, n_columns)
     signals = tuple(shared.signals)
     return Section(signals, shared.header, bool(shared.marks), shared.missing, clock, rows)
 

@@ -63,8 +63,8 @@ class _Head:
         """The name of a column of text; None: that of the times."""
         if column is None:
             return "Time"
-        _, name, _, _, what, axis = self.columns[column]
-        return " ".join(filter(None, (name, what, axis))) or f"column {column + 3}"
+        _, name, _, _, quantity, axis = self.columns[column]
+        return " ".join(filter(None, (name, quantity, axis))) or f"column {column + 3}"
 
 
 @dataclass(slots=True)
@@ -182,8 +182,8 @@ def _objects(head: _Head) -> list[_Object]:
     order = head.said.get("rotation type", "").upper()
     objects: list[_Object] = []
     before: tuple[str, ...] | None = None
-    for column, (kind, name, id_, parent, what, axis) in enumerate(head.columns):
-        channel = _channel(what, axis, euler=_ORDER.fullmatch(order) is not None)
+    for column, (kind, name, id_, parent, quantity, axis) in enumerate(head.columns):
+        channel = _channel(quantity, axis, euler=_ORDER.fullmatch(order) is not None)
         mine = kind, name, id_
         if mine != before or channel in objects[-1].channels:
             objects.append(_Object(name or f"column {column + 3}", id_, parent, [], []))
@@ -216,13 +216,13 @@ def _without(objects: Sequence[_Object], columns: Sequence[int | None]) -> list[
     return rest
 
 
-def _channel(what: str, axis: str, *, euler: bool) -> Channel:
-    kind, letter = what.lower(), axis.lower()
+def _channel(quantity: str, axis: str, *, euler: bool) -> Channel:
+    kind, letter = quantity.lower(), axis.lower()
     if kind == "position" and letter in ("x", "y", "z"):
         return Channel(f"t{letter}")
     if kind == "rotation" and letter in ("x", "y", "z", "w") and not (euler and letter == "w"):
         return Channel(f"{'r' if euler else 'q'}{letter}")
-    return Channel("", " ".join(filter(None, (what, axis))) or "value")
+    return Channel("", " ".join(filter(None, (quantity, axis))) or "value")
 
 
 def _sort_rotations(one: _Object, order: str) -> None:

@@ -250,9 +250,9 @@ def _date(text: str) -> dict[str, str]:
     return {"date": date, "time": f"{date}T{match[3]}"}
 
 
-def numbered_names(labels: Sequence[str], count: int, what: str) -> list[str]:
+def numbered_names(labels: Sequence[str], count: int, noun: str) -> list[str]:
     """The first ``count`` labels, then numbered ones."""
-    return [*labels[:count], *(f"{what} {k + 1}" for k in range(len(labels), count))]
+    return [*labels[:count], *(f"{noun} {k + 1}" for k in range(len(labels), count))]
 
 
 FORMAT = "mvnx"

@@ -210,9 +210,9 @@ def _parts(data: bytes, at: int) -> tuple[list[Part], int]:
         at = element.end()
     closed = _CLOSED.match(data, at)
     if closed is None:
-        what = quote(data[at : at + 40].lstrip())
+        excerpt = quote(data[at : at + 40].lstrip())
         raise SourceError(
-            f"a frame must consist of elements with text, not {what}", line=line_of(data, at)
+            f"a frame must consist of elements with text, not {excerpt}", line=line_of(data, at)
         )
     if len({name for name, _ in parts}) < len(parts):
         raise SourceError("a frame has two elements of the same name", line=line_of(data, at))

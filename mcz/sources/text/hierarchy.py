@@ -68,10 +68,10 @@ class _Reader:
     def error(self, message: str) -> SourceError:
         return SourceError(message, line=line_of(self.data, self.at))
 
-    def check(self, what: str, number: int, most: int) -> None:
+    def check(self, noun: str, number: int, most: int) -> None:
         """Raise SourceError, with the number of the line, for more than there may be."""
         try:
-            check_count(what, number, most)
+            check_count(noun, number, most)
         except SourceError as error:
             error.add(line=line_of(self.data, self.at))
             raise

@@ -115,10 +115,10 @@ MOST_CHANNELS = 2**20
 MOST_DEPTH = 4096
 
 
-def check_count(what: str, number: int, most: int) -> None:
-    """Raise SourceError if a skeleton has more than it may have of ``what``."""
+def check_count(noun: str, number: int, most: int) -> None:
+    """Raise SourceError if a skeleton has more than it may have of ``noun``."""
     if number > most:
-        raise SourceError(f"more than {most:,} {what}, the limit of a stored skeleton")
+        raise SourceError(f"more than {most:,} {noun}, the limit of a stored skeleton")
 
 
 Floats = NDArray[np.float64]

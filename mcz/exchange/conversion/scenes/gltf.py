@@ -230,10 +230,10 @@ class _Document:
         return len(self.accessors) - 1
 
 
-def _sizes(seen: NDArray[np.bool_]) -> Keys:
+def _sizes(is_visible: NDArray[np.bool_]) -> Keys:
     """Keys of the scale of a marker: 1 while it is visible, 0 while it is missing."""
-    frames = np.flatnonzero(np.diff(seen, prepend=~seen[:1]))
-    values = np.repeat(seen[frames, None], 3, axis=1)
+    frames = np.flatnonzero(np.diff(is_visible, prepend=~is_visible[:1]))
+    values = np.repeat(is_visible[frames, None], 3, axis=1)
     return Keys(frames, values.astype(np.float32))
 
 

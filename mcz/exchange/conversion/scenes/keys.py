@@ -240,8 +240,8 @@ class _Channel:
 
     def choose(self, times: Floats) -> None:
         """Choose all keys again."""
-        off = np.sqrt(((self.exact - self.rounded[:1]) ** 2).sum(axis=1))
-        if (off <= self.limits).all() or (self.exact == self.exact[:1]).all():
+        errors = np.sqrt(((self.exact - self.rounded[:1]) ** 2).sum(axis=1))
+        if (errors <= self.limits).all() or (self.exact == self.exact[:1]).all():
             kept = np.zeros(1, np.int64)
         else:
             marks = np.zeros(len(times), np.uint8)
@@ -341,8 +341,8 @@ class _KeySearch:
             placed: list[tuple[Floats, Floats]] = []
             for number, node in enumerate(self.nodes):
                 placed.append(self._place(number, node, placed, first, stop))
-                off = placed[-1][1] - node.places[first:stop]
-                errors[first:stop, number] = np.sqrt((off * off).sum(axis=1))
+                deviations = placed[-1][1] - node.places[first:stop]
+                errors[first:stop, number] = np.sqrt((deviations * deviations).sum(axis=1))
         return np.nan_to_num(errors, copy=False, nan=0.0)
 
     def _place(

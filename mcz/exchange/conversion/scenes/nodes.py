@@ -134,8 +134,8 @@ def scene_of(motion: Motion) -> Scene:
 def _rate(motion: Motion, timeline: Timeline) -> Fraction:
     if motion.frame_rate is not None:
         return motion.frame_rate
-    usual = 1.0 / timeline.period if timeline.period else 1.0
-    return Fraction(usual).limit_denominator(1000) or Fraction(1)
+    default = 1.0 / timeline.period if timeline.period else 1.0
+    return Fraction(default).limit_denominator(1000) or Fraction(1)
 
 
 def _times(name: str, timeline: Timeline, rate: Fraction) -> Floats:
@@ -180,12 +180,14 @@ def _markers(motion: Motion, scale: float) -> Iterator[Node]:
         if joint.adds_to_offset:
             places += np.array(joint.offset) * scale
         places[~np.isfinite(places).all(axis=1)] = np.nan
-        seen = np.flatnonzero(~np.isnan(places[:, 0]))
-        if not len(seen):
+        visible = np.flatnonzero(~np.isnan(places[:, 0]))
+        if not len(visible):
             yield Node(name, -1, np.zeros(3), None, None, places, side)
             continue
         frames = np.arange(len(places))
-        way = np.stack([np.interp(frames, seen, places[seen, axis]) for axis in range(3)], axis=1)
+        way = np.stack(
+            [np.interp(frames, visible, places[visible, axis]) for axis in range(3)], axis=1
+        )
         yield Node(name, -1, way[0], None, way, places, side)
 
 

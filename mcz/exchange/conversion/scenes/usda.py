@@ -93,11 +93,11 @@ def _markers(scene: Scene, keys: SceneKeys) -> Iterator[str]:
 
 
 def _visibility(scene: Scene, node: Node) -> Iterator[str]:
-    seen = node.is_visible
-    if seen.all():
+    is_visible = node.is_visible
+    if is_visible.all():
         return
-    frames = np.flatnonzero(np.diff(seen, prepend=~seen[:1]))
-    words = ('"inherited"' if seen[frame] else '"invisible"' for frame in frames)
+    frames = np.flatnonzero(np.diff(is_visible, prepend=~is_visible[:1]))
+    words = ('"inherited"' if is_visible[frame] else '"invisible"' for frame in frames)
     yield from _samples("token visibility", scene, frames, words)
 
 
@@ -107,7 +107,7 @@ def _skeleton(scene: Scene, keys: SceneKeys, name: str) -> Iterator[str]:
     binds[:, 3, :3] = scene.rest_places
     rests = np.tile(np.eye(4), (count, 1, 1))
     rests[:, 3, :3] = [node.rest for node in scene.nodes]
-    moving = [k for k in range(count) if keys.turns[k] is not None or keys.shifts[k] is not None]
+    animated = [k for k in range(count) if keys.turns[k] is not None or keys.shifts[k] is not None]
     yield 'def Skeleton "skeleton" ('
     yield '    prepend apiSchemas = ["SkelBindingAPI"]'
     yield ")"
@@ -117,24 +117,24 @@ def _skeleton(scene: Scene, keys: SceneKeys, name: str) -> Iterator[str]:
     yield f"    uniform token[] jointNames = [{names}]"
     yield f"    uniform matrix4d[] bindTransforms = [{', '.join(map(_matrix, binds))}]"
     yield f"    uniform matrix4d[] restTransforms = [{', '.join(map(_matrix, rests))}]"
-    if moving:
+    if animated:
         yield f"    rel skel:animationSource = </{name}/animation>"
     yield "}"
-    if moving:
-        yield from _animation(scene, keys, [paths[k] for k in moving], moving)
+    if animated:
+        yield from _animation(scene, keys, [paths[k] for k in animated], animated)
     yield from _mesh(solid_of(scene), name)
 
 
 def _animation(
-    scene: Scene, keys: SceneKeys, paths: Sequence[str], moving: Sequence[int]
+    scene: Scene, keys: SceneKeys, paths: Sequence[str], animated: Sequence[int]
 ) -> Iterator[str]:
     frames = np.arange(len(scene.times))
-    shifts = [_dense(keys.shifts[k], scene.nodes[k].rest, scene.times) for k in moving]
-    turns = [_dense(keys.turns[k], np.array([0.0, 0, 0, 1]), scene.times) for k in moving]
+    shifts = [_dense(keys.shifts[k], scene.nodes[k].rest, scene.times) for k in animated]
+    turns = [_dense(keys.turns[k], np.array([0.0, 0, 0, 1]), scene.times) for k in animated]
     yield 'def SkelAnimation "animation"'
     yield "{"
     yield f"    uniform token[] joints = [{', '.join(map(quote_text, paths))}]"
-    yield f"    half3[] scales = [{', '.join(['(1, 1, 1)'] * len(moving))}]"
+    yield f"    half3[] scales = [{', '.join(['(1, 1, 1)'] * len(animated))}]"
     for label, tracks, order in (
         ("float3[] translations", shifts, [0, 1, 2]),
         ("quatf[] rotations", turns, [3, 0, 1, 2]),  # w first
