@@ -29,6 +29,7 @@ from mcz.files.reading.file import File, open, suffixes_of
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.tables import EXPORTS, table_of
 from mcz.hints import Hint
+from mcz.model.checks import PATH, STRING, check_arguments
 from mcz.model.motion import Joint, Motion
 from mcz.model.text_format import printable
 from mcz.model.types import JsonObject, Target
@@ -202,6 +203,7 @@ BIDS = "bids"
 FORMS = (*EXPORTS, *TARGETS, *WRITERS, BIDS)
 
 
+@check_arguments(directory=PATH, to=STRING)
 def export(
     target: Target,
     directory: str | os.PathLike[str],

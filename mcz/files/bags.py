@@ -18,6 +18,7 @@ from pathlib import Path, PurePosixPath
 
 from mcz.errors import AccessError, ExistsError, FormatError, OptionError, reason_of
 from mcz.files.reading.faults import quick_check
+from mcz.model.checks import PATH, PATHS, check_arguments
 from mcz.model.text_format import count_text
 
 PAYLOAD = "data"
@@ -128,6 +129,7 @@ def is_bag(folder: str | os.PathLike[str]) -> bool:
     return (Path(folder) / DECLARATION).is_file()
 
 
+@check_arguments(folder=PATH)
 def check_bag(
     folder: str | os.PathLike[str], progress: Callable[[int, int, str], object] | None = None
 ) -> BagCheck:
@@ -269,6 +271,7 @@ SUFFIX = ".mcz"
 OXUM = "Payload-Oxum"  # bytes and files of the payload, which we count ourselves
 
 
+@check_arguments(files=PATHS, folder=PATH)
 def bag(
     files: Sequence[str | os.PathLike[str]],
     folder: str | os.PathLike[str],

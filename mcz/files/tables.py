@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics.frames import frame_poses_of
+from mcz.kinematics.frames import frame_poses_of, joint_numbers
 from mcz.kinematics.poses import accelerations, point_names, positions, rotations, velocities
+from mcz.model.checks import check_arguments
 from mcz.model.clock import TIMES, numbers_or_rows
 from mcz.model.extras import import_extra
-from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.motion import A_MOTION, Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.skeleton import Joints
 from mcz.model.text_format import printable, spreadsheet_cell
 from mcz.model.types import Items, Settings
@@ -262,6 +263,7 @@ COMPONENTS = {
 }
 
 
+@check_arguments(motion=A_MOTION)
 def to_xarray(
     motion: Motion, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
 ) -> Dataset:
@@ -356,6 +358,7 @@ def _facts(motion: Motion) -> Settings:
 PLACES = {"positions": positions, "velocities": velocities, "accelerations": accelerations}
 
 
+@check_arguments(motion=A_MOTION)
 def to_pandas(
     motion: Motion,
     what: str = "positions",
@@ -381,9 +384,7 @@ def to_pandas(
         return _table(pandas, motion, motion.signals[0], array, pairs)
     if what in COMPONENTS:
         array = rotations(motion, what, joints=joints)
-        every = motion.skeleton.joint_names
-        names = every if joints is None else _names(motion, joints)
-        pairs = _pairs(pandas, names, COMPONENTS[what][1], flat)
+        pairs = _pairs(pandas, _names(motion, joints), COMPONENTS[what][1], flat)
         return _table(pandas, motion, motion.signals[0], array, pairs)
     if what == "channels" or what in signals:
         signal = motion.signals[0] if what == "channels" else signals[what]
@@ -394,8 +395,6 @@ def to_pandas(
 
 
 def _names(motion: Motion, joints: Joints) -> tuple[str, ...]:
-    from mcz.kinematics.frames import joint_numbers
-
     every = motion.skeleton.joint_names
     return tuple(every[joint] for joint in joint_numbers(motion.skeleton, joints))
 

@@ -15,8 +15,9 @@ from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.points import first_points, positions_of
-from mcz.model.motion import Motion, Skeleton
-from mcz.model.skeleton import column_of, signs_of
+from mcz.model.checks import check_arguments
+from mcz.model.motion import A_MOTION, Motion, Skeleton
+from mcz.model.skeleton import column_of, joint_list, signs_of
 from mcz.model.text_format import count_text, fields_text
 from mcz.model.types import Bools, Floats
 
@@ -97,6 +98,7 @@ class Contacts:
         return standing
 
 
+@check_arguments(motion=A_MOTION)
 def contacts(
     motion: Motion, joints: Sequence[int | str] | None = None, rule: ContactRule = RULE
 ) -> Contacts:
@@ -136,7 +138,11 @@ class FootTracks:
     def __init__(
         self, skeleton: Skeleton, joints: Sequence[int | str] | None, n_frames: int
     ) -> None:
-        indices = find_feet(skeleton) if joints is None else [skeleton.find(j) for j in joints]
+        indices = (
+            find_feet(skeleton)
+            if joints is None
+            else [skeleton.find(j) for j in joint_list(joints)]
+        )
         if not indices:
             raise MotionError(
                 f"skeleton {skeleton.name!r}: none of its "

@@ -32,6 +32,7 @@ from mcz.kinematics.points import (
     points_of,
     positions_of,
 )
+from mcz.model.checks import FRAMES, ArgumentType, check_arguments
 from mcz.model.clock import Timeline, known_timeline
 from mcz.model.motion import Motion, Skeleton, check_poses
 from mcz.model.skeleton import Joints, joint_columns, joint_list
@@ -262,7 +263,7 @@ def tables_of(
     return joints, PointTable(np.array(points, np.int64), np.array(tails).reshape(len(points), 3))
 
 
-Frames = tuple[int, int] | slice | None
+Frames = tuple[int | None, int | None] | slice | None
 
 
 class ClipLike(Protocol):
@@ -286,6 +287,14 @@ class ClipLike(Protocol):
 
 MotionLike = Motion | ClipLike
 
+MOTION_OR_CLIP = ArgumentType(
+    "a Motion or a Clip", lambda value: hasattr(value, "signals") and hasattr(value, "n_frames")
+)
+MOTION_CLIP_OR_SKELETON = ArgumentType(
+    "a Motion, a Clip or a Skeleton",
+    lambda value: isinstance(value, Skeleton) or MOTION_OR_CLIP.accepts(value),
+)
+
 
 def frame_range(motion: MotionLike, frames: Frames) -> tuple[int, int]:
     """Frames a <= f < b, from a pair or a slice; raises OptionError if they are out of range.
@@ -300,7 +309,8 @@ def frame_range(motion: MotionLike, frames: Frames) -> tuple[int, int]:
                 "the result"
             )
         return start, max(start, stop)
-    start, stop = frames if frames is not None else (0, motion.n_frames)
+    first, end = frames if frames is not None else (None, None)
+    start, stop = first or 0, motion.n_frames if end is None else end
     if not 0 <= start <= stop <= motion.n_frames:
         raise OptionError(f"{motion.name!r} has {motion.n_frames} frames, not {start}:{stop}")
     return start, stop
@@ -348,6 +358,7 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     return skeleton.unit_cm / unit_cm
 
 
+@check_arguments(motion=MOTION_OR_CLIP, frames=FRAMES)
 def times(motion: MotionLike, frames: Frames = None, *, signal: int | str = 0) -> Floats:
     """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
 

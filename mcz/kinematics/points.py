@@ -15,7 +15,8 @@ import numpy as np
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics.chain import Chain, Pose, chain_of, multiply_matrices
-from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.checks import check_arguments
+from mcz.model.motion import A_MOTION, POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.types import Floats
 
 MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
@@ -278,6 +279,7 @@ NOTE = "positions by forward kinematics"  # the source-note of a computed motion
 SEPARATOR = "; "
 
 
+@check_arguments(motion=A_MOTION)
 def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
     """Markers at the points of ``motion``; with ``virtual_markers`` three more for every joint.
 

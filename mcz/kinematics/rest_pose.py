@@ -8,7 +8,8 @@ from decimal import ROUND_HALF_UP, Decimal
 import numpy as np
 
 from mcz.kinematics.joint_names import find_feet
-from mcz.model.motion import POSITION_KINDS, Skeleton
+from mcz.model.checks import check_arguments
+from mcz.model.motion import A_SKELETON, POSITION_KINDS, Skeleton
 from mcz.model.types import Floats
 
 NO_LENGTHS = "no bone has a length"
@@ -28,6 +29,7 @@ def has_no_lengths(skeleton: Skeleton) -> bool:
     return turned and not moved and not placed
 
 
+@check_arguments(skeleton=A_SKELETON)
 def rest_positions(skeleton: Skeleton) -> Floats:
     """Positions of the joints at rest, float64 (n_joints, 3), in length units.
 

@@ -1,14 +1,19 @@
-"""Checks of fields of the data model, of parameters of codecs, and of indices of rows."""
+"""Checks of fields of the data model, arguments, parameters of codecs, and indices of rows."""
 
 from __future__ import annotations
 
+import inspect
 import math
 import operator
+import os
 import reprlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
+from functools import wraps
+from itertools import chain
+from numbers import Real
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -35,6 +40,116 @@ def check_fields(instance: object, rules: Mapping[str, Rule]) -> None:
             raise MotionError(f"{kind}: {name} is {text}; it must be {rule.words}") from None
         if converted is not value:
             object.__setattr__(instance, name, converted)
+
+
+class ArgumentType(NamedTuple):
+    """A type of arguments in words, and its test."""
+
+    words: str
+    accepts: Callable[[Any], bool]
+
+
+def _are_paths(values: object) -> bool:
+    if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, Iterable):
+        return False
+    return not isinstance(values, Collection) or all(map(PATH.accepts, values))
+
+
+def _are_numbers(values: Any) -> bool:
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError):  # rows of different lengths
+        return False
+    return array.ndim > 0 and array.dtype.kind in "biuf"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (Real, np.number)) and not isinstance(value, bool)
+
+
+def _is_integer(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
+def _are_frames(value: Any) -> bool:
+    if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 2:
+        return isinstance(value, slice)
+    return all(end is None or _is_integer(end) for end in value)
+
+
+def _is_dtype(value: Any) -> bool:
+    try:
+        return bool(np.dtype(value))
+    except (TypeError, ValueError):
+        return False
+
+
+PATH = ArgumentType("a path", lambda value: isinstance(value, (str, os.PathLike)))
+PATHS = ArgumentType("a list of paths", _are_paths)
+STRING = ArgumentType("a string", lambda value: isinstance(value, str))
+MAPPING = ArgumentType("a dict", lambda value: isinstance(value, Mapping))
+NAMES = ArgumentType("a name or a list of names", lambda value: isinstance(value, Iterable))
+JOINTS = ArgumentType(
+    "a joint or a list of joints, each a name or an index",
+    lambda value: isinstance(value, (str, int, np.integer, Iterable)),
+)
+ITEM = ArgumentType("a name or an index", lambda value: isinstance(value, (str, int, np.integer)))
+AXIS = ArgumentType("x, y, z, -x, -y or -z", lambda value: value in "x y z -x -y -z".split())
+FRAMES = ArgumentType("a pair of integers (a, b), or a slice", _are_frames)
+NUMBERS = ArgumentType("an array of numbers", _are_numbers)
+REAL = ArgumentType("a number", _is_number)
+WHOLE = ArgumentType("an integer", _is_integer)
+SIZE = ArgumentType(
+    "a pair of integers",
+    lambda value: isinstance(value, (tuple, list)) and [*map(_is_integer, value)] == [True] * 2,
+)
+DTYPE = ArgumentType("a type of numbers, such as float32", _is_dtype)
+
+USUAL_TYPES: Mapping[str, ArgumentType] = {
+    **dict.fromkeys("unit up up_axis codec effort arrays theme view form order".split(), STRING),
+    **dict.fromkeys("axis what turns space software by rest profile".split(), STRING),
+    **dict.fromkeys("params info metadata pairs joint_map".split(), MAPPING),
+    **dict.fromkeys("names clip clips match_rest fields channels codecs".split(), NAMES),
+    **dict.fromkeys("scale shell_cm key_error_mm redundancy speed unit_cm".split(), REAL),
+    **dict.fromkeys("window stride sheet repeat max_decoded resolution".split(), WHOLE),
+    **dict.fromkeys("folder root".split(), PATH),
+    **dict.fromkeys("offsets translations bone_lengths betas".split(), NUMBERS),
+    "joints": JOINTS,
+    "joint": ITEM,
+    "signal": ITEM,
+    "size": SIZE,
+    "dtype": DTYPE,
+}
+"""Types of arguments that mean the same in all public functions."""
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def check_arguments(**types: ArgumentType) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Decorate a public function: OptionError for an argument that is not of its type.
+
+    ``types`` come before USUAL_TYPES. The default, and None if annotated, are accepted.
+    """
+
+    def decorate(function: Callable[P, T]) -> Callable[P, T]:
+        parameters = inspect.signature(function).parameters
+        known = {name: USUAL_TYPES[name] for name in USUAL_TYPES.keys() & parameters} | types
+        optional = {name for name in known if "None" in str(parameters[name].annotation)}
+
+        @wraps(function)
+        def checking(*args: P.args, **kwargs: P.kwargs) -> T:
+            for name, value in chain(zip(parameters, args, strict=False), kwargs.items()):
+                if name not in known or value is parameters[name].default:
+                    continue
+                if not (known[name].accepts(value) or (value is None and name in optional)):
+                    text = " ".join(reprlib.repr(value).split())
+                    raise OptionError(f"{name} is {text}; it must be {known[name].words}")
+            return function(*args, **kwargs)
+
+        return checking
+
+    return decorate
 
 
 def _text(value: object) -> str:

@@ -21,6 +21,7 @@ from mcz.model.checks import (
     TEXT,
     TEXT_MAP,
     TRUTH,
+    ArgumentType,
     array_of,
     check_fields,
     of_type,
@@ -319,3 +320,12 @@ class Motion:
                 signal = replace(signal, of=target, role="" if target is None else signal.role)
             signals.append(signal)
         return replace(self, signals=tuple(signals))
+
+
+A_MOTION = ArgumentType(
+    "a Motion, which clip.motion() makes of a Clip", lambda value: isinstance(value, Motion)
+)
+A_SKELETON = ArgumentType("a Skeleton", lambda value: isinstance(value, Skeleton))
+MOTION_OR_SKELETON = ArgumentType(
+    "a Motion or a Skeleton", lambda value: isinstance(value, (Motion, Skeleton))
+)

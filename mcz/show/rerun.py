@@ -15,9 +15,10 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.source_files import recording as recording_of
 from mcz.files.tables import channel_names, channel_units
 from mcz.kinematics.chain import Floats
-from mcz.kinematics.frames import MotionLike, scale_to, values_of
+from mcz.kinematics.frames import MOTION_OR_CLIP, MotionLike, scale_to, values_of
 from mcz.kinematics.points import listed_points, point_set
 from mcz.kinematics.poses import point_names
+from mcz.model.checks import check_arguments
 from mcz.model.clock import numbers_or_rows
 from mcz.model.extras import import_extra
 from mcz.model.motion import Motion, Skeleton
@@ -36,6 +37,7 @@ SIDES = {
 }
 
 
+@check_arguments(motion=MOTION_OR_CLIP)
 def to_rerun(
     motion: MotionLike, recording: RecordingStream | None = None, *, entity: str | None = None
 ) -> RecordingStream:

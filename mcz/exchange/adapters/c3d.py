@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion import convert
 from mcz.files.reading.source_files import ANALOG, recording
+from mcz.model.checks import check_arguments
 from mcz.model.extras import import_extra
-from mcz.model.motion import Motion, Signal
+from mcz.model.motion import A_MOTION, Motion, Signal
 from mcz.sources import FORMATS
 from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT
 
@@ -46,6 +47,7 @@ def from_c3d(reader: Reader, *, name: str = "motion") -> Motion:
     return motion
 
 
+@check_arguments(motion=A_MOTION)
 def to_c3d(motion: Motion) -> Reader:
     """``motion`` as a ``c3d.Reader``; needs c3d (``mcz[c3d]``).
 
@@ -105,6 +107,7 @@ def from_ezc3d(c3d: object, *, name: str = "motion") -> Motion:
     return replace(motion, signals=signals, metadata=metadata).without_source()
 
 
+@check_arguments(motion=A_MOTION)
 def to_ezc3d(motion: Motion) -> c3d:
     """``motion`` as an ``ezc3d.c3d``; needs ezc3d (``mcz[ezc3d]``).
 

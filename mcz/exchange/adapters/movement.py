@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from mcz.errors import OptionError
 from mcz.files.reading.source_files import SourceOptions
 from mcz.kinematics.poses import point_names, positions
+from mcz.model.checks import check_arguments
 from mcz.model.clock import Timeline, numbers_or_rows
 from mcz.model.extras import import_extra
-from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
+from mcz.model.motion import A_MOTION, Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.skeleton import AXES
 from mcz.model.types import Floats, JsonObject, Reals, Values
@@ -31,6 +32,7 @@ SEPARATOR = ":"  # between an individual and its keypoint, as in labels of C3D
 SLACK = 1e-3  # greatest deviation of a time, in frames
 
 
+@check_arguments(motion=A_MOTION)
 def to_movement(motion: Motion, *, unit: str | None = None) -> Dataset:
     """The points of a motion as a poses dataset of ``movement``; needs xarray (``mcz[xarray]``).
 

@@ -12,8 +12,10 @@ import numpy as np
 from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion.hierarchy import is_bvh, to_bvh
 from mcz.files.reading.source_files import SourceOptions
+from mcz.model.checks import check_arguments
 from mcz.model.extras import import_extra
 from mcz.model.motion import (
+    A_MOTION,
     POSITION_KINDS,
     ROTATION_KINDS,
     Channel,
@@ -66,6 +68,7 @@ def from_pybvh(bvh: Bvh, *, unit: str | None = None, up: str | None = None) -> M
     return SourceOptions(unit=unit, up=up).applied_to(motion)
 
 
+@check_arguments(motion=A_MOTION)
 def to_pybvh(motion: Motion) -> Bvh:
     """``motion`` as a ``pybvh.Bvh``; needs pybvh (``mcz[pybvh]``).
 

@@ -19,8 +19,9 @@ from mcz.exchange.conversion.marker_fit import Fit, from_positions
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import Hint
 from mcz.kinematics.points import in_positions, point_set
+from mcz.model.checks import STRING, check_arguments
 from mcz.model.clock import Timeline
-from mcz.model.motion import Motion
+from mcz.model.motion import A_MOTION, Motion
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources import FORMATS
 
@@ -95,6 +96,7 @@ TARGETS = {
 }
 
 
+@check_arguments(motion=A_MOTION, to=STRING)
 def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Motion:
     """``motion`` on a skeleton that files of the format ``to`` can hold: a key of ``TARGETS``.
 

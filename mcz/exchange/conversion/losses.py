@@ -10,8 +10,9 @@ import numpy as np
 from mcz.files.reading.source_files import recording
 from mcz.kinematics.points import point_set
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
+from mcz.model.checks import STRING, check_arguments
 from mcz.model.clock import TIMES, TOLERANCE, numbers_or_rows
-from mcz.model.motion import Motion
+from mcz.model.motion import A_MOTION, Motion
 from mcz.sources.c3d.plain import KNOWN
 from mcz.sources.c3d.recording import Recording, parameters_of
 from mcz.sources.tables.signals import text_columns
@@ -34,6 +35,7 @@ def keep_supported_signals(motion: Motion, to: str) -> Motion:
     )
 
 
+@check_arguments(motion=A_MOTION, to=STRING)
 def conversion_losses(motion: Motion, to: str) -> tuple[str, ...]:
     """List the facts of ``motion`` that a file of the format ``to`` cannot hold, a text each.
 

@@ -20,7 +20,8 @@ from mcz.kinematics.points import (
     without_note,
 )
 from mcz.kinematics.targets import unsolved_channels
-from mcz.model.motion import Motion, Signal, Skeleton
+from mcz.model.checks import check_arguments
+from mcz.model.motion import A_MOTION, A_SKELETON, Motion, Signal, Skeleton
 from mcz.model.text_format import fields_text
 
 FARTHEST = 2.0**100  # length units
@@ -91,6 +92,7 @@ class Solved(NamedTuple):
     fit: Fit
 
 
+@check_arguments(motion=A_MOTION, base=A_SKELETON)
 def from_positions(motion: Motion, base: Skeleton) -> Solved:
     """Markers as a motion of the skeleton ``base``, whose points they are, and the fit.
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcz.errors import MotionError, OptionError
+from mcz.model.checks import NUMBERS, check_arguments
 from mcz.model.types import Floats
 
 _NAMES = """
@@ -44,6 +45,7 @@ SIGMA, RADIUS = 20, 80  # frames, of the Gaussian that smooths the heading
 Y = np.array([0.0, 1.0, 0.0])
 
 
+@check_arguments(positions=NUMBERS)
 def humanml3d(
     positions: ArrayLike, *, bone_lengths: ArrayLike | None = None, threshold: float = 0.002
 ) -> Floats:
@@ -63,6 +65,7 @@ def humanml3d(
         return _features(places, threshold)
 
 
+@check_arguments(features=NUMBERS)
 def humanml3d_positions(features: ArrayLike) -> Floats:
     """The joint positions that features tell, (n_frames, 22, 3): the inverse of ``humanml3d``.
 

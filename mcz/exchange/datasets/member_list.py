@@ -28,6 +28,7 @@ from mcz.kinematics.poses.resampling import (
     frames_within,
     too_many_frames_error,
 )
+from mcz.model.checks import check_arguments
 from mcz.model.clock import Timeline
 from mcz.model.motion import frame_rate_of
 from mcz.model.skeleton import Joints
@@ -36,6 +37,7 @@ from mcz.model.types import JsonObject
 Target = str | os.PathLike[str] | File
 
 
+@check_arguments()
 def dataset(
     target: Target | Iterable[Target],
     fields: str | Iterable[str] = "rot6d,positions,root",
@@ -142,7 +144,11 @@ def _files(
             open_files[name] = one
             yield one, name
             continue
-        path = os.fspath(one)  # type: ignore[arg-type]
+        if not isinstance(one, (str, os.PathLike)):
+            raise OptionError(
+                f"target is {one!r}; it must be a path, an open File, or a list of them"
+            )
+        path = os.fspath(one)
         paths = [path]
         if Path(path).is_dir():
             paths = sorted(str(file) for file in Path(path).rglob("*.mcz"))

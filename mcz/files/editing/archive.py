@@ -37,11 +37,13 @@ from mcz.files.reading.source_files import SourceOptions, read_bytes
 from mcz.files.writing.atomic import WriteTransaction, check_name, refuse_inputs, replacing
 from mcz.files.writing.file import SourceEncoder, encoding_options
 from mcz.hints import split_hint
+from mcz.model.checks import PATH, PATHS, check_arguments
 from mcz.model.threads import limit_threads
 from mcz.model.types import Params, Progress, Target
 from mcz.sources import wants_skeleton
 
 
+@check_arguments(directory=PATH)
 def pack(
     directory: str | os.PathLike[str],
     target: Target,
@@ -130,6 +132,7 @@ def _inputs_of(entries: Sequence[SourceEncoder]) -> Iterator[Path]:
     return chain.from_iterable(entry.inputs for entry in entries)
 
 
+@check_arguments(sources=PATHS, target=PATH)
 def append(
     sources: Sequence[str | os.PathLike[str]],
     target: str | os.PathLike[str],

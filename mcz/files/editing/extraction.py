@@ -54,6 +54,7 @@ from mcz.files.writing.atomic import replacing_file
 from mcz.files.writing.clip_writer import Amend, write_plan
 from mcz.files.writing.planning import prepare
 from mcz.files.writing.tuning import tuned_plan
+from mcz.model.checks import FRAMES, check_arguments
 from mcz.model.motion import Motion
 from mcz.model.schema import build, parse
 from mcz.model.skeleton import Joints
@@ -97,6 +98,7 @@ class Extraction:
     __repr__ = fields_text
 
 
+@check_arguments(frames=FRAMES)
 def extract(
     source: Target,
     target: Target,

@@ -48,12 +48,14 @@ from mcz.files.reading.clips import list_some
 from mcz.files.reading.file import File, open
 from mcz.files.writing.atomic import WriteTransaction, check_name, clip_name, replacing_file
 from mcz.files.writing.file import SourceEncoder
+from mcz.model.checks import PATHS, check_arguments
 from mcz.model.schema import parse
 from mcz.model.text_format import count_text, quote_name
 from mcz.model.types import Progress, Target
 from mcz.sources import wants_skeleton
 
 
+@check_arguments(sources=PATHS)
 def merge(
     sources: Sequence[str | os.PathLike[str]],
     target: Target,

@@ -28,6 +28,7 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where, list_some, names_of
 from mcz.files.reading.differences import states_rate
 from mcz.files.reading.file import File, open
+from mcz.model.checks import MAPPING, PATH, check_arguments
 from mcz.model.motion import frame_rate_of
 from mcz.model.text_format import cell_text, quote_name, suggest_names
 from mcz.model.types import Progress, Target
@@ -36,6 +37,7 @@ from mcz.sources import FORMATS
 Entries = Mapping[str, str | None]  # a key and its value; None: removed
 
 
+@check_arguments(target=PATH, changes=MAPPING)
 def set_metadata(
     target: str | os.PathLike[str],
     changes: Mapping[str, Entries],
@@ -100,6 +102,8 @@ def registered_key(key: str) -> str:
 
 def _respell(entries: Entries) -> Entries:
     """``entries`` under registered keys; raises OptionError for two spellings of one."""
+    if not isinstance(entries, Mapping):
+        raise OptionError(f"the changes of a clip are {entries!r}; they must be a dict")
     respelled = {registered_key(key): value for key, value in entries.items()}
     if len(respelled) < len(entries):
         twice = next(key for key in SPELLINGS if key in entries)
@@ -116,6 +120,7 @@ def _changes_record(file: File, name: str, changes: Entries) -> Record:
     return record if apply_records(before, [record]) != before else Record(record.name)
 
 
+@check_arguments()
 def set_rate(
     target: Target,
     rate: Fraction | float,

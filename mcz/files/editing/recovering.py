@@ -45,7 +45,7 @@ from mcz.files.editing.rewriting import UNPROTECTED, disk_path, plan_whole, rewr
 from mcz.files.reading.faults import quick_check
 from mcz.files.reading.file import open, open_bytes
 from mcz.files.writing.atomic import replacing_file
-from mcz.model.checks import merged_ranges
+from mcz.model.checks import PATH, check_arguments, merged_ranges
 from mcz.model.text_format import count_text, fields_text
 from mcz.model.types import Progress, Target
 
@@ -364,6 +364,7 @@ def _steps(progress: Progress) -> Step:
     return step
 
 
+@check_arguments(target=PATH)
 def protect(
     target: str | os.PathLike[str],
     redundancy: float = DEFAULT,

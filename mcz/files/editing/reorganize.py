@@ -43,12 +43,14 @@ from mcz.files.reading.file import File, open
 from mcz.files.reading.sizes import models_used
 from mcz.files.writing.atomic import check_name
 from mcz.hints import Hint
+from mcz.model.checks import MAPPING, PATH, check_arguments
 from mcz.model.text_format import count_text, nearest_names, quote_name
 from mcz.model.types import Progress, Target
 
 FOLDER = "folder"  # split by the first part of the names
 
 
+@check_arguments()
 def delete_clips(
     target: Target,
     names: str | Iterable[str] = (),
@@ -138,6 +140,7 @@ def _plan_without(file: File, gone: Collection[Item]) -> Plan:
     return plan
 
 
+@check_arguments(names=MAPPING)
 def rename_clips(
     target: Target,
     names: Mapping[str, str],
@@ -186,6 +189,7 @@ def _refuse_equal(file: File, plan: Plan) -> None:
             raise OptionError(f"two files would be restored to {quote_name(path)}", path=file.name)
 
 
+@check_arguments()
 def reorder_clips(
     target: Target,
     names: Sequence[str] = (),
@@ -236,6 +240,7 @@ def natural(value: Value) -> tuple[object, ...]:
     return 0, value
 
 
+@check_arguments(directory=PATH)
 def split(
     target: Target,
     directory: str | os.PathLike[str],

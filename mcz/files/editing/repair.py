@@ -44,11 +44,13 @@ from mcz.files.reading.faults import Problem, clip_problems, validate
 from mcz.files.reading.file import File, file_of, open_bytes
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.files.writing.atomic import replacing, rereadable
+from mcz.model.checks import check_arguments
 from mcz.model.types import Progress, Target
 
 Content = set[tuple[object, ...]]
 
 
+@check_arguments()
 def repair(
     source: Target,
     target: Target,

@@ -26,6 +26,7 @@ from mcz.files.reading.clips import Where, list_some
 from mcz.files.reading.differences import RESTORED, fidelity_of, text_notes
 from mcz.files.reading.file import File, open
 from mcz.files.writing.atomic import Digest
+from mcz.model.checks import PATH, check_arguments
 from mcz.model.schema import parse, parse_until, read_varint
 from mcz.model.types import Progress, Settings, Target
 
@@ -112,6 +113,7 @@ def _digest_of(file: File, one: StoredFile) -> bytes:
 NAMES = ("stored", "portable", "strict")  # treatment of names that are not portable
 
 
+@check_arguments(directory=PATH)
 def unpack(
     target: Target,
     directory: str | os.PathLike[str],

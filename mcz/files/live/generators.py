@@ -26,6 +26,7 @@ from mcz.files.reading.read import NONE
 from mcz.files.reading.read import NOTE as SKELETON_NOTE
 from mcz.files.reading.source_files import SourceOptions, read_skeleton
 from mcz.files.writing.file import EncodingOptions, rate_notes
+from mcz.model.checks import check_arguments
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Skeleton
 from mcz.model.types import Params, Values
 from mcz.model.units import in_unit, with_axes
@@ -57,6 +58,7 @@ AXES = "xyz"
 Row = ArrayLike | Params
 
 
+@check_arguments()
 def stream_encode(
     frames: Iterable[Row],
     skeleton: Skeleton | Sequence[str],
@@ -121,6 +123,8 @@ def markers(names: Sequence[str]) -> Skeleton:
     Coordinates are ``a.x a.y a.z``, or ``a.tx a.ty a.tz``, of each marker in turn. Raises
     OptionError for no names, an empty one, or coordinates in another order.
     """
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise OptionError(f"skeleton is {names!r}; it must be a Skeleton or a list of marker names")
     if not names or not all(names):
         raise OptionError("a stream needs marker names, and none may be empty")
     split = [name.rpartition(".") for name in names]

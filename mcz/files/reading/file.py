@@ -32,6 +32,7 @@ from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Clips, Where, filter_clips, list_some
 from mcz.files.reading.lost_skeletons import restore_skeletons
 from mcz.files.reading.source_files import sourced_skeleton
+from mcz.model.checks import check_arguments
 from mcz.model.motion import Skeleton
 from mcz.model.schema import parse
 from mcz.model.text_format import count_text, quote_name
@@ -281,6 +282,7 @@ class File:
         return ids
 
 
+@check_arguments()
 def open(
     target: Target,
     salvage: bool = False,

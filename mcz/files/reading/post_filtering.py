@@ -19,13 +19,15 @@ from mcz.files.reading.source_files import SourceOptions
 from mcz.files.reading.views import Masked
 from mcz.hints import Hint
 from mcz.kinematics.points import SEPARATOR, point_set
-from mcz.model.motion import Motion, Signal, Skeleton, joint_columns
+from mcz.model.checks import check_arguments
+from mcz.model.motion import A_MOTION, Motion, Signal, Skeleton, joint_columns
 from mcz.model.skeleton import Joints, joint_list
 from mcz.model.types import Bools, Floats, Values
 
 NOTE = "post-filtered"  # the source-note of a filtered motion ends with it
 
 
+@check_arguments(motion=A_MOTION)
 def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
     """Filter quantization noise out of the positions of a motion of markers.
 

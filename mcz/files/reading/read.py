@@ -18,6 +18,7 @@ from mcz.errors import OptionError, SkeletonWarning, SourceError
 from mcz.files.reading.file import is_mcz, open
 from mcz.files.reading.source_files import SourceOptions, load, read_skeleton, read_source
 from mcz.hints import Hint
+from mcz.model.checks import PATH, check_arguments
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.text_format import first_names
 from mcz.model.units import in_unit
@@ -31,6 +32,7 @@ Given = str | os.PathLike[str] | Skeleton | None
 Counts = Mapping[str, int]
 
 
+@check_arguments(path=PATH)
 def read(
     path: str | os.PathLike[str],
     *,

@@ -20,8 +20,9 @@ from mcz.container.reader import Container
 from mcz.errors import FormatError, MczError, OptionError, SourceError, UnsupportedError, reason_of
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.views import pick_notes
+from mcz.model.checks import PATH, check_arguments
 from mcz.model.clock import SAME_RATE, usual_step
-from mcz.model.motion import FrameNotes, Motion, Skeleton, Source
+from mcz.model.motion import A_MOTION, FrameNotes, Motion, Skeleton, Source
 from mcz.model.signal import Scaling
 from mcz.model.types import JsonObject
 from mcz.model.units import in_unit, unit_cm_of, with_axes
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from mcz.sources.c3d.recording import Recording
 
 
+@check_arguments(path=PATH)
 def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     """The skeleton in an ASF file, with its source."""
     path = Path(path)
@@ -341,6 +343,7 @@ def contradiction(format_name: str, template: bytes, rate: Fraction, step: int) 
     return None if restated is None or is_one_of(restated.rate / rate, step) else restated
 
 
+@check_arguments(motion=A_MOTION)
 def recording(motion: Motion) -> Recording | None:
     """The facts that the source of ``motion`` states besides all numbers; None if there are none.
 

@@ -52,8 +52,9 @@ from mcz.files.writing.planning import (
 from mcz.files.writing.tuning import tuned_plan
 from mcz.hints import Hint, Remark
 from mcz.kinematics.rest_pose import height_note
+from mcz.model.checks import PATH, check_arguments
 from mcz.model.clock import SAME_RATE
-from mcz.model.motion import Motion, Skeleton
+from mcz.model.motion import A_MOTION, Motion, Skeleton
 from mcz.model.text_format import fields_text
 from mcz.model.threads import limit_threads
 from mcz.model.types import Params, Progress, Target
@@ -275,6 +276,7 @@ def _decoded_bytes(row: ClipRow) -> int:
     )
 
 
+@check_arguments(motion=A_MOTION)
 def write(
     motion: Motion,
     target: Target,
@@ -299,8 +301,6 @@ def write(
     small; MotionError also for a key of the metadata that SPEC.md does not register, unless it is
     private (``x-...``).
     """
-    if not isinstance(motion, Motion):
-        raise OptionError(f"the first argument must be a motion, not {type(motion).__name__}")
     check_metadata(motion.metadata, motion.name)
     chosen, limits = codec_by_name(choose_name(codec, effort)), profile_named(profile)
     motion = with_true_sources(motion, lossless=chosen.lossless)
@@ -324,6 +324,7 @@ def _refuse_other_suffix(target: Target) -> None:
         )
 
 
+@check_arguments(source=PATH)
 def encode(
     source: str | os.PathLike[str],
     target: Target,
@@ -387,6 +388,7 @@ def encode(
     return replace(written, inputs=tuple(map(str, entry.inputs)))
 
 
+@check_arguments(motion=A_MOTION)
 def to_npz(motion: Motion, target: Target, *, force: bool = False) -> None:
     """Write channels, skeleton, rotations and positions of ``motion`` as an NPZ without pickles.
 

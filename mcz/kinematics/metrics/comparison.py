@@ -31,7 +31,8 @@ from mcz.kinematics.points import (
     positions_of,
 )
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
-from mcz.model.motion import POSITION_KINDS, Motion, Signal, Skeleton
+from mcz.model.checks import check_arguments
+from mcz.model.motion import A_MOTION, POSITION_KINDS, Motion, Signal, Skeleton
 from mcz.model.types import Floats
 
 
@@ -47,13 +48,8 @@ def common_unit(a: Skeleton, b: Skeleton, notes: list[str]) -> tuple[Number, flo
     if a.unit_cm is None and b.unit_cm is None:
         notes.append(Remark("the length unit is unknown: no figures in cm", Hint.UNIT))
     else:
-        notes.append(
-            Remark(
-                "one side does not state its length unit; that of the other is used, "
-                "and there are no figures in cm",
-                Hint.UNIT,
-            )
-        )
+        text = "only one side states its length unit; it is used for both: no figures in cm"
+        notes.append(Remark(text, Hint.UNIT))
     return None, 1.0
 
 
@@ -145,6 +141,7 @@ def rows_of(signal: Signal, start: int, stop: int) -> Floats:
 BLOCK = 2**19  # numbers a block, which bounds the memory
 
 
+@check_arguments(original=A_MOTION, decoded=A_MOTION)
 def compare(
     original: Motion,
     decoded: Motion,

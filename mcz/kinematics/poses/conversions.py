@@ -15,6 +15,7 @@ from numpy.typing import DTypeLike
 from mcz.errors import OptionError
 from mcz.kinematics.chain import IDENTITY
 from mcz.kinematics.frames import (
+    MOTION_OR_CLIP,
     Frames,
     MotionLike,
     as_type,
@@ -30,6 +31,7 @@ from mcz.kinematics.rotations import (
     rotate_axes,
     vectors_of_quaternions,
 )
+from mcz.model.checks import FRAMES, check_arguments
 from mcz.model.motion import Channel, Skeleton
 from mcz.model.skeleton import Joints
 from mcz.model.text_format import quote_name
@@ -212,6 +214,7 @@ def slerp(first: Floats, second: Floats, share: Floats) -> Floats:
 SPACES = ("local", "world")
 
 
+@check_arguments(motion=MOTION_OR_CLIP, frames=FRAMES)
 def rotations(
     motion: MotionLike,
     form: str = "quat",

@@ -19,8 +19,9 @@ from mcz.kinematics.poses.conversions import (
     slerp_quaternions,
 )
 from mcz.kinematics.rotations import ORDERS, euler_angles, matrices_of_vectors, nearest_vector
+from mcz.model.checks import check_arguments
 from mcz.model.clock import TIMES, Timeline, known_timeline
-from mcz.model.motion import Motion, Signal, Skeleton, frame_rate_of
+from mcz.model.motion import A_MOTION, Motion, Signal, Skeleton, frame_rate_of
 from mcz.model.types import Floats, Ints
 
 ALIGNED = 1e-6  # of a frame: a new frame so near to an old one coincides with it
@@ -47,6 +48,7 @@ class FrameTimes:
         return self.before + (self.share > 0)
 
 
+@check_arguments(motion=A_MOTION)
 def resample(
     motion: Motion, rate: Fraction | float, *, drop_signals: bool = False, components: bool = False
 ) -> Motion:

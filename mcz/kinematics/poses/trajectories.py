@@ -14,6 +14,8 @@ from numpy.typing import DTypeLike
 
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.frames import (
+    MOTION_CLIP_OR_SKELETON,
+    MOTION_OR_CLIP,
     Frames,
     MotionLike,
     as_type,
@@ -26,6 +28,7 @@ from mcz.kinematics.frames import (
 from mcz.kinematics.points import first_points
 from mcz.kinematics.points import point_names as names_of_points
 from mcz.kinematics.poses.conversions import from_matrices
+from mcz.model.checks import FRAMES, check_arguments
 from mcz.model.clock import known_timeline
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import Joints, column_of, joint_list, signs_of
@@ -33,6 +36,7 @@ from mcz.model.text_format import fields_text, suggest_names
 from mcz.model.types import Floats, Reals
 
 
+@check_arguments(motion=MOTION_CLIP_OR_SKELETON)
 def point_names(motion: MotionLike | Skeleton, joints: Joints = None) -> tuple[str, ...]:
     """The names of the points whose ``positions`` are given, in their order.
 
@@ -66,6 +70,7 @@ def find_points(skeleton: Skeleton, joints: Joints) -> list[int]:
     return points
 
 
+@check_arguments(motion=MOTION_OR_CLIP, frames=FRAMES)
 def positions(
     motion: MotionLike,
     joints: Joints = None,
@@ -94,6 +99,7 @@ def _positions(motion: MotionLike, joints: Joints, span: tuple[int, int]) -> Flo
     return poses.positions(values_of(motion, span, needed), points)
 
 
+@check_arguments(motion=MOTION_OR_CLIP, frames=FRAMES)
 def velocities(
     motion: MotionLike,
     joints: Joints = None,
@@ -113,6 +119,7 @@ def velocities(
     return as_type(_derivative(motion, joints, frames, unit, 1, velocities_of), dtype)
 
 
+@check_arguments(motion=MOTION_OR_CLIP, frames=FRAMES)
 def accelerations(
     motion: MotionLike,
     joints: Joints = None,
@@ -184,6 +191,7 @@ class Root:
         return angles.astype(self.rotations.dtype)
 
 
+@check_arguments(motion=MOTION_OR_CLIP, frames=FRAMES)
 def root(
     motion: MotionLike,
     frames: Frames = None,

@@ -15,7 +15,9 @@ import numpy as np
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.joint_names import counterparts
 from mcz.kinematics.retargeting.joint_maps import check_channels, replace_motion
+from mcz.model.checks import check_arguments
 from mcz.model.motion import (
+    A_MOTION,
     POSITION_KINDS,
     TURNING_KINDS,
     Exceptions,
@@ -31,6 +33,7 @@ from mcz.model.types import Bools
 AXES = ("x", "y", "z")
 
 
+@check_arguments(motion=A_MOTION)
 def mirror(motion: Motion, axis: str = "x", pairs: Mapping[str, str] | None = None) -> Motion:
     """``motion`` reflected through the plane normal to ``axis`` of the world, at its origin.
 

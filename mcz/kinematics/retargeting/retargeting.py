@@ -36,12 +36,14 @@ from mcz.kinematics.retargeting.turns import (
     usual_alike,
 )
 from mcz.kinematics.targets import Targets
-from mcz.model.motion import POSITION_KINDS, Motion, Skeleton
+from mcz.model.checks import check_arguments
+from mcz.model.motion import A_MOTION, A_SKELETON, POSITION_KINDS, Motion, Skeleton
 from mcz.model.types import Floats
 
 AUTO = "auto"
 
 
+@check_arguments(motion=A_MOTION, skeleton=A_SKELETON)
 def retarget(
     motion: Motion,
     skeleton: Skeleton,

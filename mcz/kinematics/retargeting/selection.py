@@ -24,7 +24,10 @@ from mcz.kinematics.retargeting.turns import (
     set_local_turns,
 )
 from mcz.kinematics.rotations import ORDERS, euler_order
+from mcz.model.checks import JOINTS, MAPPING, NUMBERS, check_arguments
 from mcz.model.motion import (
+    A_MOTION,
+    MOTION_OR_SKELETON,
     ORIGIN,
     POSITION_KINDS,
     ROTATION_KINDS,
@@ -42,7 +45,8 @@ from mcz.model.types import Floats
 Named = TypeVar("Named", Motion, Skeleton)
 
 
-def rename(new_names: Named, mapping: Mapping[str, str]) -> Named:
+@check_arguments(item=MOTION_OR_SKELETON, mapping=MAPPING)
+def rename(item: Named, mapping: Mapping[str, str]) -> Named:
     """Rename the joints of a motion or skeleton by ``mapping``, from old name to new.
 
     Other joints keep their names; if a name repeats, ``name#1`` is the second joint of that
@@ -51,15 +55,15 @@ def rename(new_names: Named, mapping: Mapping[str, str]) -> Named:
 
     Raises OptionError for an unknown joint, and for a name that two joints would have.
     """
-    skeleton = new_names if isinstance(new_names, Skeleton) else new_names.skeleton
+    skeleton = item if isinstance(item, Skeleton) else item.skeleton
     names = _names(skeleton, mapping)
     joints = tuple(
         replace(joint, name=name) for joint, name in zip(skeleton.joints, names, strict=True)
     )
     renamed = replace(skeleton, joints=joints, base=None, source=None)
-    if isinstance(new_names, Skeleton):
+    if isinstance(item, Skeleton):
         return renamed
-    return replace_motion(new_names, renamed, new_names.signals[0])
+    return replace_motion(item, renamed, item.signals[0])
 
 
 def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
@@ -91,6 +95,7 @@ def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
 Given = TypeVar("Given", Motion, Skeleton)
 
 
+@check_arguments(item=MOTION_OR_SKELETON, offsets=NUMBERS)
 def with_offsets(item: Given, offsets: ArrayLike, unit_cm: float | None = None) -> Given:
     """A motion or skeleton with these rest offsets, (n_joints, 3), and ``unit_cm`` if given.
 
@@ -117,6 +122,7 @@ def with_offsets(item: Given, offsets: ArrayLike, unit_cm: float | None = None) 
 SCALING = ("sx", "sy", "sz")
 
 
+@check_arguments(motion=A_MOTION, joints=JOINTS)
 def select(
     motion: Motion, joints: str | int | Iterable[str | int], *, allow_translation: bool = False
 ) -> Motion:

@@ -25,9 +25,10 @@ from mcz.files.reading.sizes import by_group, byte_shares, clip_sizes
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.writing.clip_writer import write_trial
 from mcz.files.writing.planning import prepare
-from mcz.kinematics.frames import Frames, MotionLike, frame_range
+from mcz.kinematics.frames import MOTION_OR_CLIP, Frames, MotionLike, frame_range
 from mcz.kinematics.metrics import Comparison, compare
 from mcz.kinematics.metrics.sums import scale_figure
+from mcz.model.checks import FRAMES, PATH, check_arguments
 from mcz.model.motion import Motion
 from mcz.show.pictures.canvases import Theme, import_library, rgb
 from mcz.show.pictures.channel_charts import Selection, channel_chart, spectrum_chart
@@ -243,6 +244,7 @@ class Plotted:
     notes: tuple[str, ...] = ()
 
 
+@check_arguments(motion=MOTION_OR_CLIP, path=PATH, frames=FRAMES)
 def plot(
     motion: MotionLike,
     path: str | os.PathLike[str],

@@ -16,8 +16,9 @@ from mcz.errors import MotionError, OptionError
 from mcz.files.writing.atomic import replacing
 from mcz.hints import Hint, Remark
 from mcz.kinematics.chain import Floats
-from mcz.kinematics.frames import Frames, MotionLike, frame_range
+from mcz.kinematics.frames import MOTION_OR_CLIP, Frames, MotionLike, frame_range
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
+from mcz.model.checks import AXIS, FRAMES, PATH, check_arguments
 from mcz.model.clock import Timeline
 from mcz.model.types import Ints
 from mcz.show.pictures.bodies import LEFT, RIGHT, Flags, track_of
@@ -68,6 +69,7 @@ class Look:
     follow: bool | None = None
 
 
+@check_arguments(motion=MOTION_OR_CLIP, path=PATH, frames=FRAMES, up=AXIS)
 def render(
     motion: MotionLike,
     path: str | os.PathLike[str],

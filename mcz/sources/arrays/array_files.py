@@ -16,8 +16,9 @@ from typing import TypeGuard
 import numpy as np
 
 from mcz.errors import MotionError, OptionError, SourceError
+from mcz.model.checks import check_arguments
 from mcz.model.clock import numbers_or_rows
-from mcz.model.motion import Motion, Signal, Source
+from mcz.model.motion import A_MOTION, Motion, Signal, Source
 from mcz.model.types import Ints
 from mcz.sources.arrays.archive import Archive
 from mcz.sources.arrays.columns import Array, columns_of, npy_array, npz_arrays, signal_of
@@ -142,6 +143,7 @@ def _joined(arrays: Sequence[Array]) -> Array:
     return replace(one, head=head, words=words)
 
 
+@check_arguments(motion=A_MOTION)
 def split_clips(motion: Motion) -> dict[str, Motion]:
     """The clips of a library of motions, such as a pickle of several, by their names.
 

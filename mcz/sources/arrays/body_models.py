@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcz.errors import AccessError, OptionError, SourceError, reason_of
+from mcz.model.checks import NUMBERS, PATH, check_arguments
 from mcz.model.motion import Motion, Source
 from mcz.model.types import Items
 from mcz.sources.arrays.columns import MAGIC
@@ -62,6 +63,7 @@ class FoundOffsets(NamedTuple):
     greatest: float
 
 
+@check_arguments(path=PATH)
 def offsets_of_model(
     path: str | os.PathLike[str], n_joints: int, betas: ArrayLike | None = None
 ) -> Floats:
@@ -108,6 +110,7 @@ def offsets_of_joints(joints: ArrayLike, parents: Sequence[int]) -> Floats:
     return offsets
 
 
+@check_arguments(positions=NUMBERS, rotations=NUMBERS, parents=NUMBERS)
 def offsets_from_positions(
     positions: ArrayLike,
     rotations: ArrayLike,

@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
+from mcz.model.checks import check_arguments
 from mcz.model.extras import annex_bytes
 from mcz.model.motion import (
     ORIGIN,
@@ -169,6 +170,7 @@ def _trees() -> dict[str, BodyTree]:
     return {each.name: each for each in trees}
 
 
+@check_arguments()
 def body_skeleton(
     body: BodyTree | str | int,
     offsets: Items | None = None,

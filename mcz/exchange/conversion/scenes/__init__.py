@@ -15,7 +15,8 @@ from mcz.exchange.conversion.scenes.nodes import Scene, scene_of
 from mcz.exchange.conversion.scenes.usda import build_usda
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import Hint
-from mcz.model.motion import Motion
+from mcz.model.checks import check_arguments
+from mcz.model.motion import A_MOTION, Motion
 from mcz.model.text_format import fields_text
 from mcz.version import VERSION
 
@@ -102,6 +103,7 @@ def to_scene(
     )
 
 
+@check_arguments(motion=A_MOTION)
 def to_glb(
     motion: Motion,
     *,
@@ -124,6 +126,7 @@ def to_glb(
     return to_scene(motion, "glb", key_error_mm=key_error_mm, rate=rate, unit=unit, up=up)
 
 
+@check_arguments(motion=A_MOTION)
 def to_usda(
     motion: Motion,
     *,
