@@ -24,7 +24,7 @@ LIMITS = {
     "channels": "channels of a signal, and of a skeleton",
     "joints": "joints of a skeleton",
     "segment_bytes": "decoded bytes of a segment (8 a value)",
-    "model_bytes": "bytes of the payloads of all MODL chunks, repeated ones too",
+    "model_bytes": "bytes of the payloads of all MODL chunks, repeats too, none in REPT or COPY",
     "chunk_bytes": "bytes of a chunk's payload",
     "packet_bytes": "bytes of a packet's body",
     "text_bytes": "bytes of a template",

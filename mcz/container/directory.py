@@ -152,7 +152,7 @@ class Index(Record):
     clips: Table[IndexedClip] = field(columns(IndexedClip), "the clips")
     signals: Table[IndexedSignal] = field(columns(IndexedSignal), "the signals of all clips")
     segments: Table[IndexedSegment] = field(columns(IndexedSegment), "the segments of all clips")
-    n_behind: int = field(UVARINT, "first ancillary chunks, those of the last clip in previous")
+    n_behind: int = field(UVARINT, "of `ancillary`, how many belong to the last clip of `previous`")
     ancillary: Table[IndexedPlace] = field(
         columns(IndexedPlace), "the ancillary chunks of all clips"
     )

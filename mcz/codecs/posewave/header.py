@@ -98,7 +98,7 @@ class PosewaveHeader(Record):
     )  # PWAVE-12
     plain: list[int] = field(
         counted(Int8ul, 2**14),
-        "of each channel of another kind the step code of its step; none: they are 128",
+        "of each channel of another kind the step code of its step; none: each 128, a step of 1",
     )
     weights: list[int] = field(
         counted(Int8ul, 2**14), "of each joint the step code of its weight; none: all 1"
@@ -111,7 +111,7 @@ class PosewaveHeader(Record):
         counted(UVARINT, 2**14), "numbers of the groups whose channels are exact, ascending"
     )
     contacts: list[ContactsFields] = field(
-        counted(ContactsFields, 1), "none, or the parameters of contacts"
+        counted(ContactsFields, 1), "at most one: the parameters of contacts"
     )
 
 
