@@ -140,7 +140,9 @@ def test_what_cannot_be_a_bag(archive: Path, tmp_path: Path, call: Call) -> None
         ([archive, tmp_path / "none"], mcz.AccessError, "no such file"),
         ([archive, tmp_path], mcz.AccessError, "not a file"),
         ([], mcz.OptionError, "at least one file"),
-        ([tmp_path / "100%.mcz"], mcz.OptionError, "rename the file"),
+        ([tmp_path / "100%.mcz"], mcz.OptionError, "contains %.*rename the file"),
+        ([tmp_path / "a\nb.mcz"], mcz.OptionError, "contains a line end.*rename the file"),
+        ([tmp_path / "gr\udcf6.mcz"], mcz.OptionError, "not valid UTF-8; rename the file"),
     ):
         with pytest.raises(error, match=said):
             mcz.bag(files, target)

@@ -16,7 +16,7 @@ from mcz import OptionError
 from mcz.files.editing import folders, unpacking
 from mcz.files.editing.folders import HIDDEN, PortableNames, fault_of, folded, notes_on
 from mcz.files.editing.unpacking import NAMES
-from tests.commands import run
+from tests.commands import Call, run
 from tests.motions import smooth
 
 
@@ -158,6 +158,19 @@ def test_names_that_a_disk_takes_for_the_same(one: str, other: str) -> None:
     given = give(one), give(other)
     assert given[0] == one and len(set(map(folded, given))) == 2
     assert give(other) == given[1]
+
+
+def test_a_number_makes_no_name_too_long() -> None:
+    give = PortableNames()
+    names = [give(f"{start}{'n' * 250}.bvh") for start in "aA"]
+    assert names[1].endswith("~2.bvh") and [fault_of(name) for name in names] == ["", ""]
+
+
+def test_names_in_messages_are_what_they_are(tmp_path: Path, call: Call) -> None:
+    """Neither are line ends and double blanks one blank, nor bytes half of a surrogate pair."""
+    for name, shown in (("a\nb  c", r"a\nb  c"), ("gr\udcf6", r"gr\xf6")):
+        code, _, errors = call("list", tmp_path / name)
+        assert code == 1 and f"{shown}: no such file" in errors
 
 
 def test_pack_notes_and_unpack_gives_a_choice(tmp_path: Path) -> None:

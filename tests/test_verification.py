@@ -184,6 +184,13 @@ def test_quick_takes_no_part(archive_path: Path, call: Call) -> None:
     assert call("verify", archive_path, "--quick", "--source", archive_path)[0] == 2
 
 
+def test_parts_with_recovery_data_are_counted(archive_path: Path, call: Call) -> None:
+    mcz.protect(archive_path)
+    mcz.set_metadata(archive_path, {"": {"contact": "lab@example.org"}})
+    code, out, _ = call("verify", archive_path)
+    assert code == 0 and out.endswith(", 2 parts with recovery data\n")
+
+
 def test_the_command_says_what_was_not_checked(
     archive_path: Path, tmp_path: Path, call: Call
 ) -> None:

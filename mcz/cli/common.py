@@ -180,7 +180,8 @@ def _failure_of_system(error: OSError) -> Failure:
 
 
 def _text_of(error: MczError) -> str:
-    return " ".join(error.describe(OPTION_HINTS).split())
+    text = " ".join(error.describe(OPTION_HINTS, with_path=False).split())
+    return f"{error.path}: {text}" if error.path else text
 
 
 def _facts(error: MczError) -> JsonObject:

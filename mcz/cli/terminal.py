@@ -89,7 +89,7 @@ def is_terminal() -> bool:
 def say(message: str) -> None:
     """Print one line on standard error."""
     STATUS.remove()
-    click.echo(f"mcz: {printable(' '.join(message.split()))}", err=True)
+    click.echo(f"mcz: {printable(message.strip())}", err=True)
 
 
 def say_json(document: object) -> None:

@@ -224,7 +224,10 @@ def _row(kind: str, name: str, problems: list[str]) -> JsonObject:
 def _counts(rows: list[JsonObject]) -> Iterator[str]:
     words = {"structure": "every chunk checked", "source": "source identical"}
     for kind, count in Counter(row["kind"] for row in rows).items():
-        yield words.get(kind) or plural(count, kind)
+        if kind == "recovery data":  # of which one set covers a part of the file
+            yield f"{plural(count, 'part')} with recovery data"
+        else:
+            yield words.get(kind) or plural(count, kind)
 
 
 def _compare(file: File, source: str) -> JsonObject:

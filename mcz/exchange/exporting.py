@@ -11,6 +11,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
@@ -31,7 +32,7 @@ from mcz.files.tables import EXPORTS, table_of
 from mcz.hints import Hint
 from mcz.model.checks import PATH, STRING, check_arguments
 from mcz.model.motion import Joint, Motion
-from mcz.model.text_format import printable
+from mcz.model.text_format import printable, quote_name
 from mcz.model.types import JsonObject, Target
 from mcz.sources.tables.layout import UNIT_CM
 from mcz.sources.tables.motion_bids import ABOUT, CHANNELS, MOTION_SUFFIX
@@ -178,7 +179,8 @@ def _word(text: str) -> str:
 
 
 def _label(text: str) -> str:
-    return "".join(re.findall(_LABEL, text))
+    """The letters and digits of a text, at most 64: a file name holds three such labels."""
+    return "".join(re.findall(_LABEL, text))[:64]
 
 
 def _number(value: float) -> str:
@@ -254,7 +256,8 @@ def export(
         called = [clip.name for clip in chosen]
         with share_clips(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
             for done, (name, converted) in enumerate(zip(called, converting, strict=True)):
-                write(name, converted)
+                run = partial(_as_run, name, converted, written)
+                write(name, run if to == BIDS else converted)
                 if progress is not None:
                     progress(done + 1, len(called), name)
         if to == BIDS and written:
@@ -274,6 +277,25 @@ def _converted(
     clip = file.clips[name]
     motion = SourceOptions(rate=rate, unit=unit).completing(clip.motion())
     return list(_files(clip, to, motion, key_error))
+
+
+def _as_run(
+    clip: str, converted: Callable[[], Iterable[Exported]], written: set[str]
+) -> list[Exported]:
+    """The BIDS files of a clip: run 2 and so on if another clip has written files of its names."""
+    files, run = list(converted()), 1
+    if any("_run-" in path for path, _, _ in files):
+        return files
+    parts = [path.rpartition("_") for path, _, _ in files]
+    names = [path for path, _, _ in files]
+    while written.intersection(names):
+        run += 1
+        names = [f"{stem}_run-{run}_{suffix}" for stem, _, suffix in parts]
+    added = () if run == 1 else (f"the clip {quote_name(clip)}: another has the name without run",)
+    return [
+        (name, data, notes + added if name.endswith(MOTION_SUFFIX) else notes)
+        for name, (_, data, notes) in zip(names, files, strict=True)
+    ]
 
 
 def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Exported]:

@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 from mcz.errors import AccessError, ExistsError, FormatError, OptionError, reason_of
 from mcz.files.reading.faults import quick_check
 from mcz.model.checks import PATH, PATHS, check_arguments
-from mcz.model.text_format import count_text
+from mcz.model.text_format import count_text, is_utf8
 
 PAYLOAD = "data"
 DECLARATION = "bagit.txt"
@@ -333,11 +333,14 @@ def _check_files(paths: Sequence[Path]) -> None:
         other = names.setdefault(path.name.casefold(), path)
         if other is not path:
             raise OptionError(f"{other} and {path} would have the same name in the bag")
-        if set(path.name) & set("%\r\n"):  # RFC 8493 escapes them, but some tools do not
+        if odd := set(path.name) & set("%\r\n"):  # RFC 8493 escapes them, but some tools do not
             raise OptionError(
-                "the name contains %, which tools for bags treat differently; rename the file",
+                f"the name contains {'%' if '%' in odd else 'a line end'}, which tools for bags "
+                "treat differently; rename the file",
                 path=path,
             )
+        if not is_utf8(path.name):  # as manifests are
+            raise OptionError("the name is not valid UTF-8; rename the file", path=path)
         if not path.is_file():
             raise AccessError(f"{'not a file' if path.exists() else 'no such file'}", path=path)
     for path in paths:

@@ -13,6 +13,7 @@ WIDEST = 60  # characters of a name
 MOST_LISTED = 40  # names in a message
 ODD = re.compile(r"[^ -~]")  # characters that need a closer look; all others are plain
 _FORMULA = re.compile(r"'*\s*[=+\-@\uff1d\uff0b\uff0d\uff20]|'*[\t\r\n]")
+_SURROGATE = re.compile(r"[\ud800-\udfff]")
 _NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?", re.ASCII)
 NEAR = 0.6  # of 1: similarity of a suggested name
 _SHORT = reprlib.Repr()
@@ -38,19 +39,34 @@ def quote(word: str | bytes) -> str:
     return repr(word[:40] if isinstance(word, str) else word[:40].decode("latin-1"))
 
 
+def is_utf8(name: str) -> bool:
+    r"""Return whether a name of a file system is UTF-8, not bytes of another encoding.
+
+    >>> is_utf8("größe"), is_utf8("gr\udcf6\udcdfe")
+    (True, False)
+    """
+    return _SURROGATE.search(name) is None
+
+
 def printable(text: str, kept: str = "") -> str:
     r"""``text`` with invisible characters escaped, except those in ``kept``.
 
     They are control characters (C0, C1), characters that turn the direction of text, line ends of
-    all sorts and unusual blanks.
+    all sorts and unusual blanks. Bytes of file names that are not UTF-8 are shown as bytes.
 
     >>> print(printable("a\x1b[2Jb"), printable("a\u202eb"), printable("V\xe4sa"))
     a\x1b[2Jb a\u202eb Väsa
+    >>> print(printable("V\udce4sa"))
+    V\xe4sa
     """
 
     def escaped(match: re.Match[str]) -> str:
         letter = match[0]
-        return letter if letter.isprintable() or letter in kept else ascii(letter)[1:-1]
+        if letter.isprintable() or letter in kept:
+            return letter
+        if "\udc80" <= letter <= "\udcff":  # surrogateescape
+            return f"\\x{ord(letter) - 0xDC00:02x}"
+        return ascii(letter)[1:-1]
 
     return ODD.sub(escaped, text)
 

@@ -108,24 +108,31 @@ def pack(
         transaction = WriteTransaction(stream, limits, copies=copies)
         report = _write_entries(transaction, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
-        if mtimes:
-            _write_times(transaction, entries)
+        without_times = _write_times(transaction, entries) if mtimes else []
         transaction.finish()
     report.size = transaction.writer.offset
-    report.left_out += dropped_facts(root, paths, with_times=mtimes)
+    failed = {outcome.path for outcome in report.failures}
+    timeless = [entry.path for entry in without_times if entry.name not in failed]
+    report.left_out += dropped_facts(root, paths, timeless)
     report.add_messages(notes_on(entry.name for entry in entries))
     report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
 
 
-def _write_times(transaction: WriteTransaction, entries: Sequence[SourceEncoder]) -> None:
-    records = []
+def _write_times(
+    transaction: WriteTransaction, entries: Sequence[SourceEncoder]
+) -> list[SourceEncoder]:
+    """Store the times of files that are clips; return the others: skeletons, aliases and so on."""
+    records, others = [], []
     for entry in entries:
-        if entry.name in transaction.clips:
-            with suppress(OSError):
-                records.append(Record(transaction.clips[entry.name], {"mtime": stamp(entry.path)}))
+        if entry.name not in transaction.clips:
+            others.append(entry)
+            continue
+        with suppress(OSError):
+            records.append(Record(transaction.clips[entry.name], {"mtime": stamp(entry.path)}))
     with transaction.step():
         transaction.writer.metadata(records)
+    return others
 
 
 def _inputs_of(entries: Sequence[SourceEncoder]) -> Iterator[Path]:

@@ -38,9 +38,13 @@ def fault_of(part: str) -> str:
         return "it names a device"
     if part != part.rstrip(" ."):
         return f"it ends with {part[-1]!r}"
-    if len(part.encode("utf-8", "surrogatepass")) > LONGEST:
+    if _size_of(part) > LONGEST:
         return f"it is longer than {LONGEST}"
     return ""
+
+
+def _size_of(part: str) -> int:
+    return len(part.encode("utf-8", "surrogatepass"))
 
 
 def folded(name: str) -> str:
@@ -101,7 +105,10 @@ class PortableNames:
         name, number = part, 1
         while folded(folder + name) in self._taken:
             number += 1
-            name = f"{stem}~{number}{dot}{suffix}"
+            end = f"~{number}{dot}{suffix}"
+            while stem and _size_of(stem + end) > LONGEST:
+                stem = stem[:-1]
+            name = stem + end
         self._taken.add(folded(folder + name))
         return folder + name
 
@@ -276,8 +283,8 @@ def skipped_outcome(path: Path, root: Path) -> Outcome:
     return Outcome(name, "skipped", size_of(path), NO_MOTION)
 
 
-def dropped_facts(root: Path, packed: Sequence[Path], *, with_times: bool) -> Iterator[str]:
-    """Parts of a folder that no archive has: empty folders, modes, times of some files."""
+def dropped_facts(root: Path, packed: Sequence[Path], timeless: Iterable[Path]) -> Iterator[str]:
+    """Parts of a folder that no archive has: empty folders, modes, times of ``timeless`` files."""
 
     def some(word: str, paths: Iterable[Path]) -> Iterator[str]:
         names = [path.relative_to(root).as_posix() for path in paths]
@@ -292,9 +299,7 @@ def dropped_facts(root: Path, packed: Sequence[Path], *, with_times: bool) -> It
     )
     if os.name == "posix":
         yield from some("modes of executable files", filter(_is_executable, packed))
-    if with_times:
-        others = (p for p in packed if p.suffix.lower() == ".asf" or not _is_motion(p))
-        yield from some("times of files that are not clips", others)
+    yield from some("times of files that are not clips", timeless)
 
 
 def _is_executable(path: Path) -> bool:

@@ -38,6 +38,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.hints import Hint
+from mcz.model.text_format import is_utf8, printable
 from mcz.model.types import Target
 
 SUFFIX = ".part"
@@ -365,12 +366,8 @@ def alias_once(writer: Writer, name: str, id_: bytes) -> None:
 
 def check_name(path: str) -> None:
     """Raise MotionError if a file cannot be stored and restored under ``path``."""
-    try:
-        path.encode("utf-8")
-    except UnicodeEncodeError:
-        raise MotionError(
-            f"the name {os.fsencode(path)!r} is not valid UTF-8; rename the file"
-        ) from None
+    if not is_utf8(path):
+        raise MotionError(f"the name '{printable(path)}' is not valid UTF-8; rename the file")
     if not is_plain_path(path):
         raise MotionError(f"source path {path!r} is not a plain relative path; rename the file")
 
