@@ -269,7 +269,8 @@ def test_what_is_asked_for_wrongly(archive: Path, samples: Path) -> None:
         "stride is 5 frames, which does not fit windows of None": {"stride": 5},
         "dtype is int8": {"dtype": "int8"},
         "it must be a number of bytes, or a string such as '64 MB'": {"cache": "much"},
-        "no clip of at least 9999 frames": {"window": 9999},
+        "no clip of at least 9999 frames at this rate .*; the longest chosen has": {"window": 9999},
+        "no clip in the given files matches where$": {"where": "n_frames < 0"},
     }.items():
         with pytest.raises(mcz.OptionError, match=words):
             mcz.dataset(archive, **arguments)

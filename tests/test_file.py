@@ -129,6 +129,7 @@ def test_a_small_file_is_for_embedded_readers(tmp_path: Path) -> None:
         assert validate(file) == []
         clip = file.clips[motion.name]
         np.testing.assert_array_equal(clip.values[:], motion.signals[0].values)
+        assert clip.values.ndim == motion.signals[0].values.ndim
         container = file.container
         chunks = scan(container.source).chunks
         assert max(chunk.length or 0 for chunk in chunks) <= 64 * 1024

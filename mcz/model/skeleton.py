@@ -329,6 +329,8 @@ class Skeleton:
                 joint = int(joint)
         if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
             return int(joint)
+        if not self.joints:
+            raise MotionError(f"no joint {joint!r}; the skeleton has none")
         joints = text_format.suggest_names(self.addresses(), joint)
         raise MotionError(f"no joint {joint!r}; the joints are {joints}")
 

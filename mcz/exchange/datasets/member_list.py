@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
@@ -102,12 +102,19 @@ def dataset(
             if len(opened) > MOST_OPEN:
                 opened.pop(name).close()
         if not members:
-            length = "" if window is None else f" of at least {window} frames"
-            raise OptionError(f"no clip{length} in the given files")
+            raise OptionError(_reason_of_none(skipped, window, where))
         stack.pop_all()
     result = Dataset(settings, members, open_files, skipped)
     result.adopt(opened)
     return result.normalized() if normalize else result
+
+
+def _reason_of_none(skipped: Sequence[Member], window: int | None, where: object) -> str:
+    if not skipped:
+        return "no clip in the given files" + ("" if where is None else " matches where")
+    longest = max(member.n_frames for member in skipped)
+    length = "" if window is None else f" of at least {window} frames at this rate"
+    return f"no clip{length} in the given files; the longest chosen has {longest}"
 
 
 def _recipe(

@@ -40,6 +40,7 @@ class ClipValues:
     """The motion signal of a clip, sliced by frames like an array of shape ``shape``."""
 
     dtype = np.dtype("<f8")
+    ndim = 2  # dask.array.from_array needs it
 
     def __init__(self, read: Callable[..., Values], shape: tuple[int, int]) -> None:
         self._read, self.shape = read, shape
