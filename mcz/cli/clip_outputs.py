@@ -16,6 +16,7 @@ from mcz.cli.decode_options import (
     PreviewSelection,
 )
 from mcz.cli.outputs import Output
+from mcz.errors import OptionError
 from mcz.files.reading.differences import CONVERTED, RESTORED
 from mcz.model.types import JsonObject
 
@@ -155,7 +156,11 @@ def _export(clip: Clip, target: str, part: ClipSelection, options: DecodeOptions
         return _converted_output(clip, target, EXPORTS[target](table))
     if chosen is not None and channels is None:  # else the table explains why there are no joints
         skeleton = clip.skeleton
-        names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
+        numbers = [skeleton.find(joint) for joint in chosen]
+        for joint, number in zip(chosen, numbers, strict=True):
+            if numbers.count(number) > 1:
+                raise OptionError(f"joint {joint!r} is named twice; name it once")
+        names = [names[c] for number in numbers for c in skeleton.columns(number)]
     table = part.table(chosen, names)
     if target == "npz" and chosen is None and channels is None and not options.preview:
         table = replace(table, motion=part.motion())

@@ -273,6 +273,12 @@ def require_file(path: str, of_folders: str = "") -> None:
         raise Failure(problem, path=path or repr(path), kind="AccessError")
 
 
+class StandardInput(bytes):
+    """The bytes of standard input, which errors call by ``name``."""
+
+    name = "standard input"
+
+
 def bytes_or_path(path: str) -> str | bytes:
     """``path``, which must exist; for ``-`` the bytes of standard input."""
     if path != "-":
@@ -280,7 +286,7 @@ def bytes_or_path(path: str) -> str | bytes:
         return path
     if sys.stdin is None:
         raise Failure("standard input is closed")
-    data = sys.stdin.buffer.read()
+    data = StandardInput(sys.stdin.buffer.read())
     if not data:
         raise Failure("standard input is empty")
     return data
@@ -349,7 +355,7 @@ OPTION_HINTS: Words = {
     Hint.RECODE: "--recode re-encodes them",
     Hint.RECODE_LOSSY: "--recode re-encodes them, which adds a small error",
     Hint.REPLACE: "replace it with mcz append --replace",
-    Hint.SALVAGE: "--salvage reads them, mcz repair writes them to a valid file",
+    Hint.SALVAGE: "--salvage reads the intact parts, mcz repair writes them to a valid file",
     Hint.SERIES: "choose channels by name (--channel)",
     Hint.SKELETON: "choose one with --skeleton, or 'none'",
     Hint.UNIT: "set the unit (--unit)",
@@ -373,6 +379,9 @@ def add_salvage_hint(target: str | bytes, options: Params) -> Iterator[None]:
     except FormatError as error:
         from mcz.files.reading.file import is_source
 
+        name = target if isinstance(target, str) else getattr(target, "name", None)
+        if error.path not in (None, name):
+            raise  # of another file
         whole = None if options.get("salvage") else _intact_counts(target)
         if whole is not None:
             error.add(note=whole, hint=Hint.SALVAGE)

@@ -85,8 +85,22 @@ def encode_command(
         raise Failure("--format applies only to standard input; SRC has a suffix", Exit.USAGE)
     require_file(source, f": mcz pack {shlex.quote(source)} OUT.mcz")
     if source.lower().endswith(".mcz"):
-        raise Failure("it is an .mcz already; to add it to another, use mcz append", path=source)
+        raise Failure(_reason_against_mcz(source), path=source)
     return _encode_file(source, output, skeleton, force, as_json, **options)
+
+
+def _reason_against_mcz(path: str) -> str:
+    """The reason why encode refuses a file with the suffix .mcz: mostly it is an MCZ file."""
+    from mcz.container.chunks import SIGNATURE
+    from mcz.sources import FORMATS, likely_formats
+
+    with errors_about(path), Path(path).open("rb") as file:
+        start = file.read(4096)
+    names = [] if start.startswith(SIGNATURE) else likely_formats(start)
+    if not names:
+        return "it is an .mcz already; to add it to another, use mcz append"
+    suffix = FORMATS[names[0]].suffix
+    return f"its content is {suffix[1:].upper()}, but its suffix is .mcz; rename it to {suffix}"
 
 
 def _encode_piped(

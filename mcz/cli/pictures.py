@@ -24,6 +24,7 @@ from mcz.cli.common import (
 )
 from mcz.cli.outputs import resolve_output
 from mcz.cli.terminal import Progress, echo, plural, print_json, say, table
+from mcz.model.text_format import shorten
 
 if TYPE_CHECKING:
     from mcz.files.reading.clip import Clip
@@ -184,6 +185,7 @@ def render_command(
 
 PLOTS = ("channels", "spectrum", "error", "bytes", "rate-distortion")  # as in mcz.show.pictures
 MOST_ROWS = 24  # of a table that is printed
+MOST_TEXT = 120  # characters of a name that is printed
 
 
 @click.command(
@@ -295,10 +297,10 @@ def plot_command(
 
 
 def _plot_lines(target: str, plotted: Any) -> Iterator[str]:
-    yield f"{target}: {plotted.title}"
+    yield f"{target}: {shorten(plotted.title, MOST_TEXT)}"
     for rows in plotted.tables:
         more = len(rows) - 1 - MOST_ROWS
-        lines = [list(row) for row in rows[: MOST_ROWS + 1]]
+        lines = [[shorten(cell, MOST_TEXT) for cell in row] for row in rows[: MOST_ROWS + 1]]
         yield from (f"  {line}" for line in table(lines, "l" + "r" * (len(rows[0]) - 1)))
         if more > 0:
             yield f"  {more:,} more rows; --json and a .html have them"

@@ -14,7 +14,7 @@ from mcz.container.limits import check
 from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
 from mcz.model.schema import MAX_COUNT, read_varint, varint
-from mcz.model.text_format import quote
+from mcz.model.text_format import compression_remark, quote
 
 SIGNATURE = b"\x89MCZ\r\n\x1a\n"
 END_MAGIC = b"\x89ZCM\r\n\x1a\n"
@@ -251,7 +251,8 @@ def check_signature_in(data: bytes) -> None:
     if not data:
         raise TruncatedError("the file is empty")
     if data != SIGNATURE[: len(data)]:  # CHUNK-01
-        raise FormatError(f"not an MCZ file: it begins with {quote(data)}")
+        remark = compression_remark(data) or f"it begins with {quote(data)}"
+        raise FormatError(f"not an MCZ file: {remark}")
     if len(data) < len(SIGNATURE):
         raise TruncatedError(f"the file ends at {len(data)}, in its signature")
 

@@ -318,7 +318,8 @@ def open_source(target: Target) -> ByteSource:
     """
     if isinstance(target, (bytes, bytearray, memoryview)):
         data = bytes(target)
-        return ByteSource(io.BytesIO(data), name="bytes", target=data)
+        name = str(getattr(target, "name", "bytes"))
+        return ByteSource(io.BytesIO(data), name=name, target=data)
     if not isinstance(target, (str, os.PathLike)):
         if not hasattr(target, "read"):
             raise OptionError(

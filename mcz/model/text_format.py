@@ -48,6 +48,34 @@ def is_utf8(name: str) -> bool:
     return _SURROGATE.search(name) is None
 
 
+COMPRESSIONS = {
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ\0": "xz",
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"7z\xbc\xaf\x27\x1c": "7z",
+}
+
+
+def compression_remark(data: bytes) -> str | None:
+    """A remark on a file that begins with ``data`` if another program compressed it.
+
+    >>> compression_remark(b"\\x1f\\x8b\\x08")
+    'it is compressed by gzip: decompress it first'
+    """
+    names = [name for start, name in COMPRESSIONS.items() if data.startswith(start)]
+    return f"it is compressed by {names[0]}: decompress it first" if names else None
+
+
+def shorten(text: str, most: int) -> str:
+    """``text``, of which at most ``most`` characters are left, with invisible ones escaped.
+
+    >>> shorten("LeftFoot", 20), shorten("LeftFoot", 5)
+    ('LeftFoot', 'Left…')
+    """
+    return printable(text if len(text) <= most else f"{text[: most - 1]}…")
+
+
 def printable(text: str, kept: str = "") -> str:
     r"""``text`` with invisible characters escaped, except those in ``kept``.
 

@@ -20,6 +20,7 @@ from typing import Any
 from mcz.errors import FormatError, SourceError, UnsupportedError
 from mcz.hints import Hint
 from mcz.model.motion import FrameNotes, Source
+from mcz.model.text_format import compression_remark
 from mcz.model.types import JsonObject
 from mcz.sources.text.source import Arriving
 
@@ -222,6 +223,8 @@ def format_of(path: str | Path, data: bytes | None = None) -> Format:
         is_unlike = bool(likely) and likely[0] != "csv"
         looks = f"; it looks like {FORMATS[likely[0]].suffix}" if is_unlike else ""
         hint = Hint.BLENDER if suffix in BLENDER_SUFFIXES else None
+        if remark := compression_remark(data or b""):
+            raise SourceError(remark, path=path)
         message = f"no source format has the suffix {suffix!r}, but {known}{looks}"
         raise SourceError(message, path=path, hint=hint)
     if not likely or likely[0] == "csv" or any(suffix in FORMATS[n].suffixes for n in likely):

@@ -158,7 +158,7 @@ class Folder:
             for part in parts:
                 if fault := fault_of(part):
                     raise AccessError(f"this system does not allow the name {part!r}: {fault}")
-        self._root.mkdir(parents=True, exist_ok=True)
+        make_folder(self._root)
         place = self._root
         for part in parts[:-1]:
             place = place / part
@@ -371,6 +371,14 @@ def nanoseconds(text: str) -> int | None:
     except (ValueError, OverflowError):
         return None
     return seconds * SECOND + int((match[2] or "").ljust(9, "0"))
+
+
+def make_folder(path: Path) -> None:
+    """Create a folder and those above it; raises AccessError if a file is in the way."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise AccessError("it is a file, but a folder is needed", path=path) from None
 
 
 def set_time(path: Path, text: str | None) -> bool:

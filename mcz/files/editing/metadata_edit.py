@@ -256,6 +256,9 @@ def _read_rows(path: Path) -> list[dict[str, str]]:
     except csv.Error as error:
         raise OptionError(str(error), path=path, line=reader.line_num) from None
     head = reader.fieldnames or []
+    if not rows:
+        empty = "has no row below its header" if text.strip() else "is empty"
+        raise OptionError(f"the table {empty}", path=path)
     if len(set(head)) != len(head):
         raise OptionError("two columns have the same name", path=path)
     for number, row in enumerate(rows, 2):

@@ -17,7 +17,7 @@ from mcz.container.chunks import ChunkType
 from mcz.container.reader import Container
 from mcz.errors import ExistsError, OptionError
 from mcz.files.editing import Outcome, Report
-from mcz.files.editing.folders import PortableNames
+from mcz.files.editing.folders import PortableNames, make_folder
 from mcz.files.editing.rewriting import (
     ALIAS,
     ATTACHMENT,
@@ -265,7 +265,7 @@ def split(
         for path in () if force else outputs.values():
             if os.path.lexists(path):
                 raise ExistsError("already exists", path=path, hint=Hint.FORCE)
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         step = steps(progress, len(file.clips))
         for value, names in groups.items():
             plan, part = _plan_part(file, names, with_rest=value == rest), Report()

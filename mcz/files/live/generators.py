@@ -28,6 +28,7 @@ from mcz.files.reading.source_files import SourceOptions, read_skeleton
 from mcz.files.writing.file import EncodingOptions, rate_notes
 from mcz.model.checks import check_arguments
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Skeleton
+from mcz.model.text_format import compression_remark
 from mcz.model.types import Params, Values
 from mcz.model.units import in_unit, with_axes
 from mcz.sources import FORMATS, likely_formats
@@ -389,5 +390,5 @@ def suffix_of(data: bytes, format_name: str | None) -> str:
     """The suffix of files of a source format, or the likely one of ``data``; OptionError."""
     formats = likely_formats(data) if format_name is None else (format_name,)
     if not formats:
-        raise OptionError("the format is unknown; name it")
+        raise OptionError(compression_remark(data) or "the format is unknown; name it")
     return FORMATS[formats[0]].suffix

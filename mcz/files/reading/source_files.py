@@ -24,6 +24,7 @@ from mcz.model.checks import PATH, check_arguments
 from mcz.model.clock import SAME_RATE, usual_step
 from mcz.model.motion import A_MOTION, FrameNotes, Motion, Skeleton, Source
 from mcz.model.signal import Scaling
+from mcz.model.text_format import compression_remark
 from mcz.model.types import JsonObject
 from mcz.model.units import in_unit, unit_cm_of, with_axes
 from mcz.sources import (
@@ -100,7 +101,9 @@ def _read_with(path: Path, reader: Any, data: bytes, *arguments: object) -> Any:
 
 
 def _other_content(path: Path, data: bytes) -> str | None:
-    """A note if an unreadable file begins like one of another suffix."""
+    """A note if an unreadable file is compressed, or begins like one of another suffix."""
+    if remark := compression_remark(data):
+        return remark
     formats = [FORMATS[name] for name in likely_formats(data)]
     suffixes = [
         known.suffix for known in formats if known.is_motion is None or known.is_motion(data)

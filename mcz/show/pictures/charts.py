@@ -17,7 +17,7 @@ import numpy as np
 from mcz.errors import MotionError, OptionError
 from mcz.files.writing.atomic import replacing
 from mcz.kinematics.chain import Floats
-from mcz.model.text_format import printable
+from mcz.model.text_format import printable, shorten
 from mcz.model.types import Settings
 from mcz.show.pictures.canvases import THEMES, Theme, new_figure, plot_context, theme_of
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 
 SUFFIXES = (".png", ".svg", ".html")
+MOST_TITLE, MOST_LABEL = 120, 40  # characters of texts in a picture
 MOST_POINTS = 3000  # of a line: of more the least and the greatest of neighbors
 
 
@@ -76,8 +77,8 @@ def picture_bytes(
     with plot_context():
         if titled:
             heading = {"color": theme.ink, "fontsize": 11, "fontweight": "bold", "ha": "left"}
-            figure.suptitle(printable(chart.title), parse_math=False, x=0.012, **heading)
-        about = {"Date": None, "Title": printable(chart.title)} if kind == "svg" else {}
+            figure.suptitle(shorten(chart.title, MOST_TITLE), parse_math=False, x=0.012, **heading)
+        about = {"Date": None, "Title": shorten(chart.title, MOST_TITLE)} if kind == "svg" else {}
         try:
             chart.draw(figure, theme)
             figure.savefig(out, format=kind, metadata=about, dpi=100 if kind == "svg" else 150)
@@ -109,10 +110,10 @@ def style(axes: Axes, theme: Theme, *, x: str = "", y: str = "", title: str = ""
     axes.grid(True, color=theme.grid, linewidth=0.6)
     axes.set_axisbelow(True)
     words: Settings = {"parse_math": False, "color": theme.quiet, "fontsize": 9}
-    axes.set_xlabel(printable(x), **words)
-    axes.set_ylabel(printable(y), **words)
+    axes.set_xlabel(shorten(x, MOST_LABEL), **words)
+    axes.set_ylabel(shorten(y, MOST_LABEL), **words)
     heading: Settings = {"loc": "left", "fontsize": 9.5}
-    axes.set_title(printable(title), **words | heading | {"color": theme.ink})
+    axes.set_title(shorten(title, MOST_TITLE), **words | heading | {"color": theme.ink})
     return axes
 
 
@@ -125,8 +126,7 @@ def legend(axes: Axes, theme: Theme, **options: Any) -> None:
 
 def name_ticks(axes: Axes, places: ArrayLike, names: Sequence[str], most: int) -> None:
     """Names of bars at their places, long ones cut, not parsed as mathematics."""
-    labels = [printable(name) for name in names]
-    labels = [name if len(name) <= most else f"{name[: most - 1]}…" for name in labels]
+    labels = [shorten(name, most) for name in names]
     for tick in axes.set_yticks(places, labels):
         tick.label1.set_parse_math(False)
     axes.grid(False, axis="y")
@@ -135,7 +135,7 @@ def name_ticks(axes: Axes, places: ArrayLike, names: Sequence[str], most: int) -
 def line(axes: Axes, x: Floats, y: Floats, color: str, label: str = "", **options: Any) -> None:
     """A line of many points, of which only the visible ones are drawn; breaks where y is NaN."""
     x, y = thin_line(x, y)
-    axes.plot(x, y, color=color, label=printable(label), **{"linewidth": 1.1} | options)
+    axes.plot(x, y, color=color, label=shorten(label, MOST_LABEL), **{"linewidth": 1.1} | options)
 
 
 def thin_line(x: Floats, y: Floats) -> tuple[Floats, Floats]:
