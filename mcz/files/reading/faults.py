@@ -323,10 +323,7 @@ def verify(
 
 
 def part_problems(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Row]:
-    """Kind, name and faults of every skeleton, clip and attachment, one after the other.
-
-    ``clips``: only these, and their skeletons.
-    """
+    """Kind, name and faults of skeletons, clips (all, or ``clips``) and attachments in turn."""
     items = [("skeletons", "")]
     items += [("clip", clip.name) for clip in (file if clips is None else clips)]
     items += [("attachment", name) for name in (file.attachments if clips is None else ())]
