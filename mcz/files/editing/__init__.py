@@ -32,7 +32,7 @@ class Outcome:
         "alias" (the same bytes are stored under another name)
     of a restored file:
         "restored", "written", "cut" or "lossy" (the clip differs from its source)
-    of a item that is copied from another archive:
+    of an item that is copied from another archive:
         "copied", "renamed", "moved", "deleted"
     of a truncated or damaged file:
         "salvaged", "dropped", "damaged"

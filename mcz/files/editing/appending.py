@@ -179,7 +179,7 @@ def _whole_until(source: ByteSource, start: int) -> int:
 
 
 def _is_last_part(source: ByteSource, chunk: Chunk) -> bool:
-    """Return True if ``chunk`` ends a item: of an attachment only the last part does."""
+    """Return True if ``chunk`` ends an item: of an attachment only the last part does."""
     if chunk.type != ChunkType.ATTA:
         return True
     fields = parse(payloads.Atta, read_payload(source, chunk, chunk.size), chunk.label)

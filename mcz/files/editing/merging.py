@@ -208,7 +208,7 @@ class Merger:
 
 
 def _content(file: File, item: Item) -> Callable[[], object]:
-    """A finder of the content of a item, equal for two that can replace each other."""
+    """A finder of the content of an item, equal for two that can replace each other."""
     kind, name = item
     if kind == ALIAS:
         return _alias_content(file, name)

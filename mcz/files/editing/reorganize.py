@@ -169,7 +169,7 @@ def rename_clips(
 
 
 def _rename_change(file: File, item: Item, new: str) -> Change:
-    """The change that names a item ``new``: the path of a clip's source may follow."""
+    """The change that names an item ``new``: the path of a clip's source may follow."""
     path = path_of(file, item) if item[0] == CLIP else ""
     suffix = PurePosixPath(path).suffix
     return Change(new, new + suffix if path and path == item[1] + suffix else None)

@@ -323,7 +323,7 @@ def copy_items(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
 
 
 def path_of(file: File, item: Item, change: Change = UNCHANGED) -> str:
-    """The path under which a item is restored; "" if it is not."""
+    """The path under which an item is restored; "" if it is not."""
     kind, name = item
     if kind != CLIP:
         return change.name or name
