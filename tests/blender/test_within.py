@@ -83,12 +83,12 @@ def test_the_kernels_that_it_has(python: str, package: Path, tmp_path: Path) -> 
 
 
 def test_with_plain_python(python: str, samples: Path, tmp_path: Path) -> None:
-    """Blender's Python and NumPy are enough to read and to write."""
-    folder, data = tmp_path / "wheels", build.build_zip()[1]
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+    """Blender's Python, NumPy and construct are enough to read and to write."""
+    with zipfile.ZipFile(io.BytesIO(build.build_zip()[1])) as archive:
         archive.extractall(tmp_path / "addons/mcz_blender")
-    with zipfile.ZipFile(io.BytesIO(build.mcz_wheel({})[1])) as wheel:
-        wheel.extractall(folder)
+    for _, data in build.mcz_wheel({}), build.installed_wheel("construct"):
+        with zipfile.ZipFile(io.BytesIO(data)) as wheel:
+            wheel.extractall(tmp_path / "wheels")
     mcz.encode(samples / "walk.bvh", tmp_path / "walk.mcz")
     words = "export", tmp_path / "walk.mcz", tmp_path / "out.mcz"
     found = check(python, tmp_path, *words)
@@ -160,7 +160,7 @@ def refused(**words):
     raise AssertionError("not refused")
 
 (line,) = refused(filepath=archive)
-assert line.endswith("all.mcz has 3 clips, choose one: walk, walk.bvh, walk.c3d"), line
+assert line.endswith("all.mcz: the file has 3 clips; choose one: walk, walk.bvh, walk.c3d"), line
 (line,) = refused(filepath=cut)
 assert "cut.mcz" in line, line
 before = set(bpy.data.objects)
