@@ -94,6 +94,6 @@ def split_hint(text: str) -> tuple[str, Hint | None]:
     return (text.words, text.hint) if isinstance(text, Remark) else (text, None)
 
 
-def worded(text: str, hints: Words) -> str:
+def with_worded_hint(text: str, hints: Words) -> str:
     """``text`` with the hint that it may have in the words of ``hints``."""
     return with_hint(*split_hint(text), hints)

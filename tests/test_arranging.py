@@ -267,10 +267,10 @@ def test_numbers_in_names_count_as_numbers() -> None:
 
 
 def test_a_file_that_somebody_grows_is_left_alone(files: tuple[Path, Path]) -> None:
-    from mcz.files.editing.appending import growing
+    from mcz.files.editing.appending import append_at_end
 
     with (
-        growing(files[0], salvage=False, force=False),
+        append_at_end(files[0], salvage=False, force=False),
         pytest.raises(mcz.AccessError, match="another process"),
     ):
         mcz.delete_clips(files[0], "walk")

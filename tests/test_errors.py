@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.cli.common import OPTION_HINTS
 from mcz.errors import Fields, FormatError, MczError, SourceError, error_context
-from mcz.hints import PYTHON_HINTS, Hint, Remark, worded
+from mcz.hints import PYTHON_HINTS, Hint, Remark, with_worded_hint
 
 
 def classes(base: type[MczError] = MczError) -> Iterator[type[MczError]]:
@@ -88,8 +88,8 @@ def test_every_hint_has_words_for_python_and_for_the_command_line() -> None:
 def test_a_remark_keeps_its_hint() -> None:
     remark = pickle.loads(pickle.dumps(Remark("it exists", Hint.FORCE)))
     assert remark == f"it exists; {PYTHON_HINTS[Hint.FORCE]}"
-    assert worded(remark, OPTION_HINTS) == f"it exists; {OPTION_HINTS[Hint.FORCE]}"
-    assert worded("it exists", OPTION_HINTS) == "it exists"
+    assert with_worded_hint(remark, OPTION_HINTS) == f"it exists; {OPTION_HINTS[Hint.FORCE]}"
+    assert with_worded_hint("it exists", OPTION_HINTS) == "it exists"
 
 
 # What the package does with them --------------------------------------------------

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import mcz
-from mcz.files.editing.appending import growing
+from mcz.files.editing.appending import append_at_end
 from mcz.sources.sample import write_samples
 from tests.clocked_files import bvh
 
@@ -35,7 +35,7 @@ def test_two_appends_at_once(folder: Path) -> None:
     path = folder / "a.mcz"
     before = path.read_bytes()
     with (
-        growing(path, salvage=False, force=False) as growth,
+        append_at_end(path, salvage=False, force=False) as growth,
         pytest.raises(mcz.AccessError, match="another process is appending"),
     ):
         mcz.append([folder / "two.bvh"], path)
@@ -52,7 +52,7 @@ def test_a_file_replaced_while_it_grows(folder: Path) -> None:
     wanted = (folder / "b.mcz").read_bytes()
     with (
         pytest.raises(mcz.AccessError, match="another file replaced it"),
-        growing(path, salvage=False, force=False) as growth,
+        append_at_end(path, salvage=False, force=False) as growth,
     ):
         growth.added.write(b"x")
         (folder / "b.mcz").replace(path)

@@ -24,7 +24,7 @@ from mcz.files.query_tree import (
     Node,
     Not,
     Or,
-    printed,
+    print_query,
 )
 
 CLIP: dict[str, Value] = {
@@ -257,7 +257,7 @@ trees = st.recursive(leaves, join_nodes, max_leaves=8)
 
 @given(trees)
 def test_a_tree_is_printed_and_parsed_again(tree: Node) -> None:
-    assert repr(parse(printed(tree))) == repr(tree)  # of reprs, for 5 == 5.0 == True
+    assert repr(parse(print_query(tree))) == repr(tree)  # of reprs, for 5 == 5.0 == True
 
 
 tokenish = st.sampled_from(
@@ -277,7 +277,7 @@ def test_any_text_parses_or_is_refused(text: str) -> None:
 
 @given(trees, st.fixed_dictionaries({name: st.none() | scalars for name in NAMES}))
 def test_evaluation_against_a_reference(tree: Node, clip: dict[str, Value]) -> None:
-    assert Query(printed(tree)).matches(clip.__getitem__) is (reference(tree, clip) == 1)
+    assert Query(print_query(tree)).matches(clip.__getitem__) is (reference(tree, clip) == 1)
 
 
 def reference(node: Any, clip: dict[str, Value]) -> float:

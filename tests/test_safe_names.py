@@ -14,7 +14,7 @@ import pytest
 import mcz
 from mcz import OptionError
 from mcz.files.editing import folders, unpacking
-from mcz.files.editing.folders import HIDDEN, PortableNames, fault_of, folded, notes_on
+from mcz.files.editing.folders import HIDDEN, PortableNames, fault_of, fold_name, notes_on
 from mcz.files.editing.unpacking import NAMES
 from tests.commands import Call, run
 from tests.motions import smooth
@@ -156,7 +156,7 @@ def test_names_that_a_disk_takes_for_the_same(one: str, other: str) -> None:
     assert list(notes_on([one, other])) == [other]
     give = PortableNames()
     given = give(one), give(other)
-    assert given[0] == one and len(set(map(folded, given))) == 2
+    assert given[0] == one and len(set(map(fold_name, given))) == 2
     assert give(other) == given[1]
 
 

@@ -282,7 +282,7 @@ def test_axes_have_signs_and_are_not_parallel(tmp_path: Path) -> None:
     again = mcz.read(tmp_path / "walk.mcz")
     assert again.skeleton == found
     assert (again.values == bvh_walk().values).all()
-    assert SourceOptions(up="x", forward="y").completing(motion).skeleton == found
+    assert SourceOptions(up="x", forward="y").complete(motion).skeleton == found
     assert mcz.Skeleton((), up_axis="+y").up_axis == "y"
     with pytest.raises(mcz.MotionError, match="parallel"):
         mcz.Skeleton((), up_axis="y", forward_axis="-y")

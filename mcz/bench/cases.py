@@ -37,7 +37,7 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True)
-class Loaded:
+class LoadedCase:
     """A case in memory; ``digest`` covers all inputs of its figures."""
 
     motion: Motion
@@ -46,13 +46,13 @@ class Loaded:
 
 
 @lru_cache(maxsize=2)
-def load(case: Case) -> Loaded:
+def load(case: Case) -> LoadedCase:
     """The motion of a case; raises SourceError or OptionError."""
     motion = mcz.read(case.path, unit=case.unit)
     data = Path(case.path).read_bytes()
-    seed = hashlib.sha256(data)
-    seed.update(repr((motion.skeleton.joints, motion.skeleton.unit_cm, case.unit)).encode())
-    return Loaded(motion, data, seed.hexdigest())
+    digest = hashlib.sha256(data)
+    digest.update(repr((motion.skeleton.joints, motion.skeleton.unit_cm, case.unit)).encode())
+    return LoadedCase(motion, data, digest.hexdigest())
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Variant:
         return " ".join([self.codec, *words])
 
     @property
-    def published(self) -> bool:
+    def is_published(self) -> bool:
         return dict(self.params).get("preset") in PUBLISHED
 
     def options(self, more: Params | None = None) -> JsonObject:
@@ -130,7 +130,7 @@ def _value(text: str) -> Any:
 def find_cases(paths: Sequence[str], unit: str | None) -> list[Case]:
     """The cases of files and folders, each once.
 
-    Of a folder everything below it counts, .amc before .bvh before .c3d. Raises OptionError if
+    A folder stands for all files below it, .amc before .bvh before .c3d. Raises OptionError if
     there is none.
     """
     cases: list[Case] = []
@@ -146,10 +146,10 @@ def find_cases(paths: Sequence[str], unit: str | None) -> list[Case]:
 
 def cases_by_names(cases: Sequence[Case]) -> dict[str, Case]:
     """Cases by name; the second and later ones of a name by their path."""
-    cases_by_name: dict[str, Case] = {}
+    by_name: dict[str, Case] = {}
     for case in cases:
-        cases_by_name[case.path if case.name in cases_by_name else case.name] = case
-    return cases_by_name
+        by_name[case.path if case.name in by_name else case.name] = case
+    return by_name
 
 
 def reason_of_failure(error: MczError) -> str:

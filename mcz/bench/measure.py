@@ -80,7 +80,7 @@ def measure(case: Case, variant: Variant, params: Params, *, markers: bool = Tru
 
 
 def _ratios(motion: Motion, source_bytes: int, coded: int) -> dict[str, float | None]:
-    """Ratios with the numerators of the clip itself, whatever its codec stores."""
+    """Compression ratios, whose numerators do not depend on the codec."""
     per_joint = 40 * motion.n_frames * motion.skeleton.n_joints
     numerators = (source_bytes, 4 * motion.signals[0].values.size, per_joint)
     names = ("cr_source", "cr_float32", "cr_40B")
@@ -112,7 +112,7 @@ def peak_bytes(work: Callable[[], object]) -> int:
 
 
 def speeds(case: Case, variant: Variant, params: Params) -> Record:
-    """Frames a second, warm, of the codec alone, of writing and reading files, of parsing text.
+    """Frames a second, warm: the codec alone, writing and reading a file, parsing text.
 
     Peak memory is the codec's own, without the values themselves.
     """

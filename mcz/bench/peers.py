@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mcz
-from mcz.bench.cases import Loaded
+from mcz.bench.cases import LoadedCase
 from mcz.bench.measure import cpu_seconds
 from mcz.kinematics.angles import unwrap
 from mcz.model.types import JsonObject
@@ -48,7 +48,7 @@ def missing_peers() -> list[str]:
     return [module for name, module in MODULES.items() if name not in installed_peers()]
 
 
-def measure(loaded: Loaded) -> list[Record]:
+def measure(loaded: LoadedCase) -> list[Record]:
     """One record a peer and input; zfp also with bounds on the error of a value."""
     motion = loaded.motion
     values = np.asarray(motion.signals[0].masked(), np.float64)
@@ -56,13 +56,13 @@ def measure(loaded: Loaded) -> list[Record]:
         values = unwrap(values, motion.skeleton)
     matrix = np.ascontiguousarray(np.nan_to_num(values), np.float32)
     source = PeerInput(loaded.data, values, matrix, motion.signals[0].to_ordinals()[0])
-    records = [_measured(loaded, peer) for peer in _peers(source)]
+    records = [_measure_peer(loaded, peer) for peer in _peers(source)]
     if "zfp" in installed_peers():
-        records += _bounded(loaded, matrix)
+        records += _zfp_records(loaded, matrix)
     return records
 
 
-def _measured(loaded: Loaded, peer: Peer) -> Record:
+def _measure_peer(loaded: LoadedCase, peer: Peer) -> Record:
     start = process_time()
     packed = peer.pack()
     took = max(process_time() - start, 1e-9)
@@ -72,7 +72,7 @@ def _measured(loaded: Loaded, peer: Peer) -> Record:
     return _record(loaded, peer.name, peer.what, len(packed)) | rates
 
 
-def _record(loaded: Loaded, name: str, peer: str, size: int) -> Record:
+def _record(loaded: LoadedCase, name: str, peer: str, size: int) -> Record:
     motion = loaded.motion
     return {
         "peer": name,
@@ -168,7 +168,7 @@ def _blosc2(matrix: NDArray[np.generic]) -> bytes:
     return bytes(blosc2.compress2(matrix, typesize=matrix.itemsize, **options))
 
 
-def _bounded(loaded: Loaded, matrix: Matrix) -> Iterator[Record]:
+def _zfp_records(loaded: LoadedCase, matrix: Matrix) -> Iterator[Record]:
     """zfp with a bound on the error of a value, and the resulting errors of the motion."""
     zfpy = import_module("zfpy")
     motion = loaded.motion

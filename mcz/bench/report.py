@@ -133,7 +133,7 @@ def _panel(
         if not pairs:
             continue
         number = codecs.index(curve.variant.codec if curve.variant else curve.label)
-        published = bool(curve.variant and curve.variant.published)
+        published = bool(curve.variant and curve.variant.is_published)
         style: object = PUBLISHED if published else "-" if curve.variant else PEER
         axes.plot(
             *zip(*pairs, strict=True),
@@ -167,7 +167,7 @@ def _panel(
 
 
 def plain_ticks(axis: Axis) -> None:
-    """Marks at 1, 2 and 5, on a long range at 1, of a logarithmic axis as plain numbers."""
+    """Label a logarithmic axis at 1, 2 and 5, a long one only at 1, with plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()

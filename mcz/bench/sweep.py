@@ -53,7 +53,7 @@ def bd_sqnr(reference: RatePoints, other: RatePoints) -> float | None:
 
 
 def _mean_difference(a: tuple[Values, Values], b: tuple[Values, Values]) -> float | None:
-    """The mean of y of ``b`` minus y of ``a`` over their common x."""
+    """The mean over their common x of the y of ``b`` minus that of ``a``."""
     if min(len(a[0]), len(b[0])) < FEWEST:
         return None
     low, high = max(a[0][0], b[0][0]), min(a[0][-1], b[0][-1])

@@ -115,7 +115,7 @@ def key_of(task: Task) -> str:
 def _one_thread() -> Iterator[None]:
     """Limit processes started in the block to one thread of matrix products.
 
-    CPU time counts all threads, and threads of BLAS wait for each other by running.
+    CPU time counts all threads, and BLAS threads spin while they wait.
     """
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))

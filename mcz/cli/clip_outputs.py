@@ -221,7 +221,7 @@ def summary_facts(clips: Mapping[str, ConversionSummary]) -> JsonObject:
 
 
 def summary_lines(clips: Mapping[str, ConversionSummary]) -> Iterator[str]:
-    """The same as lines of text."""
+    """The summary as lines of text."""
     for clip in clips.values():
         if clip.fit is not None:
             yield _fit_line(clip.fit)

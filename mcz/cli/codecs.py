@@ -77,7 +77,7 @@ def _codec_lines(codec: Codec) -> Iterator[str]:
     rows = [["parameter", "default", "range", "meaning"]]
     for facts in codec.document()["parameters"]:
         default = "none" if facts["default"] is None else text_of(facts["default"])
-        first, *rest = _wrapped(facts["meaning"])
+        first, *rest = _wrap_lines(facts["meaning"])
         rows.append([facts["name"], default, facts["range"], first])
         rows += [["", "", "", line] for line in rest]
     yield from (f"  {line}" for line in table(rows))
@@ -91,7 +91,7 @@ def text_of(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _wrapped(text: str) -> list[str]:
+def _wrap_lines(text: str) -> list[str]:
     from textwrap import wrap
 
     return wrap(text, WIDEST) or [""]

@@ -28,7 +28,7 @@ from mcz.errors import (
     UnsupportedError,
     reason_of,
 )
-from mcz.hints import PYTHON_HINTS, Hint, Words, worded
+from mcz.hints import PYTHON_HINTS, Hint, Words, with_worded_hint
 from mcz.model.text_format import count_text
 from mcz.model.types import JsonObject, Params
 
@@ -112,11 +112,11 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
         _give_up_output()
         return Exit.FINE
     except (click.ClickException, MczError, OSError, MemoryError) as error:
-        return _failed(error, as_json="--json" in words)
+        return _report_failure(error, as_json="--json" in words)
     except ImportError as error:
         if not _is_starved(error):
             raise
-        return _failed(MemoryError(), as_json="--json" in words)
+        return _report_failure(MemoryError(), as_json="--json" in words)
     except _Terminated:
         say("terminated")
         return Exit.TERMINATED
@@ -151,7 +151,7 @@ def _is_starved(error: ImportError) -> bool:
     return "failed to map segment" in str(error) or "annot allocate memory" in str(error)
 
 
-def _failed(error: Exception, *, as_json: bool) -> Exit:
+def _report_failure(error: Exception, *, as_json: bool) -> Exit:
     failure = _failure_of(error)
     if as_json and not isinstance(failure, JsonRefused):
         say_json({"error": _facts(failure)})
@@ -365,8 +365,8 @@ OPTION_HINTS: Words = {
 
 
 def in_options(text: str) -> str:
-    """``text`` with its hint, if it has one, in words of the command line."""
-    return worded(text, OPTION_HINTS)
+    """``text`` and its hint, if any, in terms of the command line."""
+    return with_worded_hint(text, OPTION_HINTS)
 
 
 @contextmanager

@@ -177,7 +177,7 @@ def _part(clip: str, signal: str, array: str, values: Values | NDArray[np.bool_]
 
 
 def _sources(file: File) -> Iterator[Part]:
-    """Every stored file with a name: of clips, attached, and aliases."""
+    """Every stored file by its name: sources of clips, attachments and aliases."""
     from mcz.files.editing.unpacking import named_files
 
     lacking: UnsupportedError | None = None

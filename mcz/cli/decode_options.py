@@ -142,7 +142,7 @@ class Input:
 
     @contextmanager
     def open_file(self) -> Iterator[tuple[File, tuple[str, ...]]]:
-        """The open .mcz, of a source file one in memory; and the files that were read for it."""
+        """The open .mcz, in memory for a source file, and the files that were read for it."""
         if not self.is_source:
             options = {"salvage": self.salvage, "unverified": self.unverified, "verify": True}
             with open_input(self.file, max_decoded=self.max_decoded, **options) as file:  # CEND-06
@@ -241,7 +241,7 @@ class ClipSelection:
             names,
             _floats(values),
             mask,
-            _repeated(numbers, len(values)),
+            _repeat_rows(numbers, len(values)),
             rate,
             units,
             times=times,
@@ -253,7 +253,7 @@ class ClipSelection:
 
 
 class FilteredSelection(ClipSelection):
-    """The same of a ``FilteredClip``."""
+    """A ``ClipSelection`` of a ``FilteredClip``."""
 
     def fidelity(self, data: bytes) -> str:
         return FILTERED
@@ -275,7 +275,7 @@ class PreviewSelection(ClipSelection):
             names,
             _floats(preview.values),
             np.ones(preview.values.shape, np.bool_) if preview.mask is None else preview.mask,
-            _repeated(numbers, len(preview.values)),
+            _repeat_rows(numbers, len(preview.values)),
             rate / preview.step if rate is not None and preview.is_regular else None,
             times=None if timeline is None else timeline.times[preview.frames],
         )
@@ -323,5 +323,5 @@ def _floats(values: Values) -> NDArray[np.float64]:
     return np.asarray(values, dtype=np.float64)
 
 
-def _repeated(numbers: NDArray[np.int64], n_rows: int) -> NDArray[np.int64]:
+def _repeat_rows(numbers: NDArray[np.int64], n_rows: int) -> NDArray[np.int64]:
     return np.repeat(numbers, n_rows // max(1, len(numbers)))

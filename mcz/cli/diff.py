@@ -187,7 +187,7 @@ class _Side:
                 all_ratios = clip_ratios(self.file, clip)
                 ratios = {key: all_ratios[key] for key in RATIOS}
             facts = SourceOptions(rate=options.rate, unit=options.unit, up=options.up)
-            return _Loaded(facts.completing(motion), start, ratios)
+            return _Loaded(facts.complete(motion), start, ratios)
 
 
 def _range(frames: FrameRange, n_frames: int, owner: str) -> tuple[int, int]:
@@ -341,10 +341,10 @@ def _table_by_joint(joints: Sequence[Params]) -> list[str]:
     shelled = any(joint["shell_mean_cm"] is not None for joint in joints)
     rows[0] += [f"shell mean {unit}", f"max {unit}", "frame"] if shelled else []
     for joint in joints:
-        row = [joint["joint"], *(_scaled(joint[key], factor) for key in points)]
+        row = [joint["joint"], *(_scaled_text(joint[key], factor) for key in points)]
         row.append(_frame_text(joint["max_position_error_frame"]))
         if shelled:
-            row += [_scaled(joint[key], factor) for key in shell]
+            row += [_scaled_text(joint[key], factor) for key in shell]
             row.append(_frame_text(joint["shell_max_frame"]))
         rows.append(row)
     return ["", *table(rows, "lrrrrrr"[: len(rows[0])])]
@@ -358,11 +358,11 @@ def _table_of_contacts(contacts: Sequence[Params]) -> list[str]:
     rows = [["contact of", "first", "frames", "mean mm", "max mm", "path mm", "original's mm"]]
     for each in contacts:
         counts = [str(each["first"]), str(each["n_frames"])]
-        rows.append([each["joint"], *counts, *(_scaled(each[key], 1.0) for key in keys)])
+        rows.append([each["joint"], *counts, *(_scaled_text(each[key], 1.0) for key in keys)])
     return ["", *table(rows, "lrrrrrr")]
 
 
-def _scaled(value: float | None, factor: float) -> str:
+def _scaled_text(value: float | None, factor: float) -> str:
     return "" if value is None else f"{value * factor:.4g}"
 
 

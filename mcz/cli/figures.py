@@ -37,7 +37,7 @@ def figure_lines(entries: Params) -> Iterator[str]:
 
 
 def error_summary(quality: Mapping[str, str]) -> str:
-    """The error of a lossy clip in one line: of its points, or, without any, of its channels."""
+    """The error of a lossy clip on one line, of its channels if it has no points."""
     cm = "mean_position_error_cm" in quality
     suffix, unit = ("_cm", "cm") if cm else ("", "units")
     mean, most = (quality.get(f"{key}_position_error{suffix}") for key in ("mean", "max"))

@@ -32,9 +32,8 @@ def motion_energy(motion: MotionLike, cells: int = CELLS) -> Floats | None:
     """The mean speed of all points in ``cells`` equal parts of the frames, float64 (n,).
 
     In length units a second, or a frame if times are unknown; NaN where no position is known. No
-    step is taken across a break in time; with fewer frames there are fewer parts. Of a clip with
-    more segments than parts one segment a part is decoded. None without kinematics, or with fewer
-    than two frames.
+    step crosses a break in time; fewer frames make fewer parts. A clip with more segments than
+    parts decodes one segment a part. None without kinematics, or with fewer than two frames.
     """
     if motion.n_frames < 2:
         return None
@@ -44,7 +43,7 @@ def motion_energy(motion: MotionLike, cells: int = CELLS) -> Floats | None:
     sampled = not isinstance(motion, Motion) and len(signal.rows) > cells
     try:
         with np.errstate(all="ignore"):
-            return _sampled(motion, edges) if sampled else _full_speeds(motion, edges)
+            return _sample_speeds(motion, edges) if sampled else _full_speeds(motion, edges)
     except MczError:  # no kinematics, or damaged
         return None
 
@@ -71,7 +70,7 @@ def _full_speeds(motion: MotionLike, edges: Any) -> Floats:
     return sums / np.where(counts, counts, np.nan)
 
 
-def _sampled(motion: MotionLike, edges: Any) -> Floats:
+def _sample_speeds(motion: MotionLike, edges: Any) -> Floats:
     from mcz.kinematics.poses import positions
 
     middles = (edges[:-1] + edges[1:]) // 2

@@ -196,7 +196,7 @@ def _try_codecs(walk: Motion) -> Iterator[JsonObject]:
         row = {"name": name, "bytes": None, "encode": None, "decode": None, "fault": None}
         try:
             row |= _try_codec(walk, name)
-        except Exception as error:  # the test goes on, whatever is wrong with one codec
+        except Exception as error:  # a faulty codec does not stop the test
             row["fault"] = str(error) or type(error).__name__
         yield row
 

@@ -165,7 +165,7 @@ def _print_others(
 
 
 def _as_csv(rows: list[JsonObject], names: Sequence[str]) -> str:
-    """RFC 4180 except for its line ends: a head, then the values, none of them a formula."""
+    """A table as in RFC 4180, but with LF: a header, then values, none of which is a formula."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     for row in ([*names], *([row[name] for name in names] for row in rows)):

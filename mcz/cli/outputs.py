@@ -97,7 +97,7 @@ def check_suffix(output: str | None, name: str, *, is_skeleton: bool) -> None:
 
 
 def _unknown(output: str, suffix: str, text: str, own: tuple[str, ...]) -> Failure:
-    """The refusal of a suffix, with the nearest that would do."""
+    """The error for an unknown suffix, which suggests the nearest known one."""
     from mcz.model.text_format import nearest_names
 
     known = list(dict.fromkeys((*filter(None, own), *(f".{name}" for name in TARGETS))))

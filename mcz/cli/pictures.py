@@ -66,7 +66,7 @@ def open_motion(
     require_file(path)
     with errors_about(path):
         read = {name: facts.pop(name) for name in ("skeleton", "arrays", "model")}
-        yield SourceOptions(**facts).completing(mcz.read(path, **read))
+        yield SourceOptions(**facts).complete(mcz.read(path, **read))
 
 
 def frame_bounds(

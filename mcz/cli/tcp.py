@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 MOST_WAITING = 4 * 2**20  # bytes that a client may lag behind
 LINGER = 10.0  # seconds that clients have for the rest, after the last frame
-PATIENCE = 10.0  # seconds in which a client must send its token
+PATIENCE = 10.0  # seconds for a client to send its token
 LOOPBACK = "127.0.0.1"
 
 

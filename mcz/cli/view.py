@@ -163,13 +163,13 @@ def _serve(
 
     with Server(viewer_page(registry), registry, host=host, port=port) as server:
         if as_json:
-            print_json({"url": server.url, "files": server.site.work.files()})
+            print_json({"url": server.url, "files": server.site.tasks.files()})
         else:
             echo(server.url)
         if not no_browser and not show(server.url):
             registry.report("no browser found; open the address above on this machine")
         try:
-            server.site.visitors.wait(for_ever=keep)
+            server.site.open_pages.wait(for_ever=keep)
         except KeyboardInterrupt:
             return Exit.FINE  # the usual way to end it
     return Exit.FINE
@@ -339,4 +339,4 @@ def _complete(clip: Clip, options: Settings) -> Clip | Motion:
         return clip
     from mcz.files.reading.source_files import SourceOptions
 
-    return SourceOptions(**{fact: options[fact] for fact in FACTS}).completing(clip.motion())
+    return SourceOptions(**{fact: options[fact] for fact in FACTS}).complete(clip.motion())

@@ -21,7 +21,7 @@ from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, Skel
 from mcz.model.types import Bools, Floats
 
 RULES = ("sensitivity", "depth", "flat")
-LEAST_SHARE = 1 / 16  # least weight of a channel, of the mean of rotations
+LEAST_SHARE = 1 / 16  # least weight of a channel, relative to the mean of rotations
 SAMPLED_FRAMES = 128  # for measuring sensitivities
 
 

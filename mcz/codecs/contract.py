@@ -68,7 +68,7 @@ FindModel = Callable[[bytes], Model | None]
 
 
 def model_id(model: Model) -> bytes:
-    """Id of a model, by which clips refer to its MODL."""
+    """Id by which clips refer to the MODL of a model."""
     return hashlib.sha256(b"MODL\0" + varint(model.kind) + model.data).digest()[:ID_SIZE]
 
 

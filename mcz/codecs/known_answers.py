@@ -1,6 +1,6 @@
 """Self-test: a known answer of each codec, decoded once per process before anything else.
 
-It detects miscompiled kernels, and processors that fuse products, before they decode real data.
+It detects miscompiled kernels and fused products before real data are decoded.
 ``known_answers.json`` has the answers; ``tools/known_answers.py`` writes it.
 """
 

@@ -75,7 +75,7 @@ class Lengths:
         return shorter if self.least <= shorter < length else length
 
     def fit(self, length: int, n_frames: int, n_bytes: float) -> int:
-        """Halve ``length`` while a segment is too large, of which ``n_frames`` take ``n_bytes``."""
+        """Halve ``length`` while a segment would be too large; ``n_frames`` took ``n_bytes``."""
         most = float(TARGET_BYTES)
         while n_bytes * min(length, n_frames) > most * n_frames:
             shorter = self.halve(length)
@@ -108,7 +108,7 @@ def segments_by_halving(
 
 @dataclass(frozen=True, slots=True)
 class Sizing:
-    """Size targets by which a codec of ordinals chooses its segment lengths.
+    """Targets for the segment lengths of a codec of ordinals.
 
     About ``target`` bytes, ``most`` at most; ``value_bytes`` a value as the first estimate;
     ``spare`` bytes besides the streams; ``most_rows``. ``full``: a segment that is much smaller is

@@ -49,7 +49,7 @@ DEFAULT_DEGREES = 0.2  # of channels: the step for a rotation of average effect
 THRESHOLD = 0.6  # of a step: smaller coefficients become 0
 BLOCKS, BLOCK_FRAMES = 16, 240  # sample of an encoder
 SPARSITY, ITERATIONS = 12, 30  # of bases of the clip itself, from its principal components on
-MOST_DIGITS, LEAST_DIGITS = 7, 3  # binary, of the first and the last vectors of such bases
+MOST_DIGITS, LEAST_DIGITS = 7, 3  # binary digits of the first and the last vectors of such bases
 LARGEST = 2.0**80
 LEAST, MOST = 2.0**-60, 2.0**60  # steps
 WHICH = ("auto", "known", "cosines", "learned")
@@ -141,7 +141,7 @@ def are_positions(skeleton: Skeleton) -> bool:
 
 
 def default_step(sample: Sample) -> float:
-    """The default step: a share of the spread of the points of a frame."""
+    """The default step: a share of the spread of a frame's points."""
     if not sample.apart:
         return DEFAULT_DEGREES
     parts = [part for part in sample.matrices(sample.frames) if part.size]
@@ -189,7 +189,7 @@ def choose_space(name: str, sample: Sample, step: float, basis: str, in_time: In
 
 
 def live_choice(name: str, layout: Layout, step: float | None, basis: str) -> Choice:
-    """The same before any frame is known: well-known bases if there are some, or cosines.
+    """Choose a space before any frame is known: well-known bases, or else cosines.
 
     Raises OptionError without a step, or if ``basis`` names bases of the motion itself.
     """

@@ -186,7 +186,7 @@ def window_coefficients(training: TrainingSet, n_frames: int, n_kept: int) -> Fl
 
 
 def steps(training: TrainingSet, n_frames: int, every: int = 1) -> Floats:
-    """Displacements of points in ``n_frames``, from every frame or every so many, (N, J, 3)."""
+    """Displacements of points over ``n_frames``, from every ``every``-th frame, (N, J, 3)."""
     if n_frames < 1 or every < 1:
         raise OptionError(f"cannot make steps of {n_frames} frames from every {every} frames")
     return np.concatenate(

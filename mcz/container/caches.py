@@ -26,7 +26,7 @@ LEAST_SHARE = 0.5  # used again: a whole run costs about two parts
 
 
 class Run(NamedTuple):
-    """All shown frames, from ``start`` on, of segments that hang together."""
+    """All shown frames, from ``start`` on, of segments that depend on each other."""
 
     start: int
     values: Values

@@ -109,7 +109,7 @@ def _mend_headers(source: ByteSource, scanned: ScanResult) -> Iterator[tuple[int
 
 
 def _check_whole(source: ByteSource, chunk: Chunk) -> None:
-    """Check all of a chunk, of an open one its first packet; raises FormatError."""
+    """Check a whole chunk, or the first packet of an open one; raises FormatError."""
     if chunk.length is None:
         if next(packets(source, chunk)).packet.kind == END:
             raise FormatError(f"chunk {chunk.label} has no packet")
@@ -197,7 +197,7 @@ def owners_of(source: ByteSource, scanned: ScanResult) -> dict[tuple[int, int], 
 
 
 def _read_last_index(source: ByteSource, scanned: ScanResult) -> Directory | None:
-    """The content of the last intact INDX, and of those that it continues up to a damaged one."""
+    """The content of the last intact INDX, and of the intact ones that it continues."""
     for chunk in reversed(scanned.chunks):
         if chunk.type == ChunkType.INDX:
             whole: list[Listed] = []

@@ -254,7 +254,7 @@ class ClipRow:
         return None
 
     def __eq__(self, other: object) -> bool:
-        """Compare contents, one of them perhaps packed."""
+        """Compare contents, packed or not."""
         if not isinstance(other, ClipRow):
             return NotImplemented
         return all(getattr(self, f.name) == getattr(other, f.name) for f in fields(ClipRow))
@@ -350,7 +350,7 @@ class ClipRows(MutableMapping[str, ClipRow]):
         return None if name is None else self[name]
 
     def copy(self) -> ClipRows:
-        """The same rows, to be added to."""
+        """A copy to which rows can be added."""
         twin = copy(self)
         twin._rows = dict(self._rows)
         return twin
@@ -398,7 +398,7 @@ class IndexPlace:
 class Directory:
     """Everything in a file by name or id. ``end`` is the offset after the last FOOT.
 
-    ``indexes``: the INDX that it was read from, each of which continues the one before.
+    ``indexes``: the INDX chunks that it was read from; each continues the previous one.
     """
 
     head: bytes = b""

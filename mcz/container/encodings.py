@@ -228,7 +228,7 @@ def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
 
 
 def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
-    """The copies in ``payload``, of the COPY ``chunk``; they decode to ``limit`` at most.
+    """Parse ``payload`` of the COPY ``chunk``; copies decode to at most ``limit`` bytes.
 
     Raises FormatError if they are not in file order, or not before the COPY.
     """
@@ -267,7 +267,7 @@ def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
 def find_uncopied(
     source: ByteSource, directory: Directory, payload_of: Callable[[Chunk], bytes]
 ) -> list[Copy]:
-    """Copies of the chunks after the last COPY of a file; of aliases the directory has none."""
+    """Find chunks without copies, those after the last COPY; aliases are not in the directory."""
     copies = copy_chunks(source, directory)
     last = copies[-1].offset if copies else 0
     later = [

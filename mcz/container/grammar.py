@@ -96,7 +96,7 @@ class ChunkEvent:
 
     @property
     def end(self) -> int:
-        """The offset after it; of an open DATA the offset of its first packet."""
+        """The offset after it, or of the first packet of an open DATA."""
         chunk = self.chunk
         return chunk.payload_offset if chunk.length is None else chunk.offset + chunk.size
 
@@ -111,9 +111,9 @@ class ChunkEvent:
 class PacketEvent:
     """A packet of the open DATA ``chunk``; its body begins at ``body``.
 
-    ``number`` is the number of the frame in a packet without a segment of its own, ``segment`` the
-    header of the segment in another: None in an end packet, and where unknown. ``is_masked``: it
-    implies the mask of the packet before.
+    ``number``: the frame of a packet without a segment; ``segment``: the header of the segment of
+    another one, None in an end packet or if unknown. ``is_masked``: it implies the mask of the
+    previous packet.
     """
 
     chunk: Chunk

@@ -34,8 +34,8 @@ from mcz.model.schema import Table, build, deflate
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
 PACKETS = {SEGMENT: 64, FRAME: 32}
-INDEXES = 4  # a writer leaves at most so many, so that few requests open a file
-GROWTH = 27  # times the bytes of the additions: a smaller INDX is merged into the new one
+INDEXES = 4  # most INDX chunks of a writer, so that few requests open a file
+GROWTH = 27  # an INDX of less than so many times the additions is merged with them
 SIGNAL_ROW = attrgetter(*(f.name for f in fields(SignalRow)))
 
 
@@ -56,12 +56,12 @@ def build_index(directory: Directory) -> bytes:
 
 
 def index_content(directory: Directory, since: IndexPlace | None = None) -> bytes:
-    """The index of the additions ``since`` another one, not deflated yet."""
+    """The index of the additions ``since`` another one, before deflate."""
     return build(index_record(directory, since), "INDX")
 
 
 def index_record(directory: Directory, since: IndexPlace | None = None) -> Index:
-    """The same as a record."""
+    """The record of ``index_content``."""
     if since is None:
         return Listing(directory).record()
     new = Directory(
@@ -157,5 +157,5 @@ def segment_rows(clip: ClipRow) -> Packed:
 
 
 def end_of(clip: ClipRow, rows: Packed) -> int:
-    """The end of the last of these segments of a clip, or of its CLIP."""
+    """The end of the last of ``rows``, or of the CLIP if there are none."""
     return clip.clip.stop + sum(gap + size for gap, size, *_ in rows)

@@ -55,7 +55,7 @@ Fetch = Callable[[int, int], bytes]  # bytes by offset and size
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """An INDX: its name, the one that it continues, and its content."""
+    """A parsed INDX: its name in messages, the previous one and its content."""
 
     chunk: PreviousIndex
     previous: PreviousIndex | None
@@ -98,7 +98,7 @@ def index_name(data: bytes, offset: int) -> PreviousIndex:
 
 
 def read_indexes(fetch: Fetch, offset: int, length: int, limit: int) -> Iterator[Listed]:
-    """The INDX chunk at an offset, then the one that it continues, and so on; FormatError."""
+    """Yield the INDX at an offset, then each one that it continues; raises FormatError."""
     expected: PreviousIndex | None = None
     for _ in range(MOST_INDEXES):
         index = parse_index(fetch(offset, length), offset, limit)
@@ -258,7 +258,7 @@ class ClipTables:
         return row
 
     def ancillary(self, group: int, start: int) -> list[Chunk]:
-        """The ancillary chunks after clip ``group`` - 1, of group 0 after the clips before."""
+        """The ancillary chunks after clip ``group`` - 1, for group 0 after earlier clips."""
         first, stop = self.ancillary_bounds[group : group + 2]
         table = self.index.ancillary[first:stop]
         return [

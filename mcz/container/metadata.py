@@ -92,7 +92,7 @@ def record_bytes(record: Record) -> bytes:
 
 
 def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
-    """The records in ``payload``, of the META ``chunk`` of a file of ``file_bytes``.
+    """Parse ``payload``, that of the META ``chunk`` in a file of ``file_bytes``.
 
     Raises FormatError, and LimitError if they would be longer than an index may be.
     """

@@ -216,14 +216,14 @@ def numbers_of(base: payloads.TimeBase | None, n_frames: int, name: str, *, whol
 
 
 class MissingRunCounter:
-    """The missing runs of a clip whose frames come one by one, from ``number`` on."""
+    """Counts the missing runs of a clip, frame by frame, from ``number`` on."""
 
     def __init__(self, number: int) -> None:
         self.runs: list[payloads.MissingRun] = []
         self._last, self._frames, self._gap = number - 1, 0, 0  # since the run before
 
     def miss(self, count: int) -> None:
-        """Skip so many frames after the last one; raises OptionError before the first."""
+        """Skip ``count`` frames after the last one; raises OptionError before the first."""
         if count < 1 or not (self._frames or self.runs):
             raise OptionError(f"{count} frames cannot be marked as missing here")
         if self._last + self._gap + count >= MAX_NUMBER:

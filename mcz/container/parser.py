@@ -128,7 +128,7 @@ class Parser:
         return end, self._stop - end
 
     def feed(self, data: bytes) -> None:
-        """Append the bytes requested by ``wants``, or more of them."""
+        """Append the bytes requested by ``wants``, or more."""
         n_used = min(max(0, self.at - self._start), len(self._data))
         self._start, self._data = self._start + n_used, self._data[n_used:] + data
 
@@ -276,7 +276,7 @@ class Parser:
         return self._read_payload(chunk, self._want(chunk))
 
     def _read_payload(self, chunk: Chunk, most_bytes: int) -> Event:
-        """The chunk, checked as far as it is read."""
+        """Read a chunk, and check what is read of it."""
         assert chunk.length is not None
         at, end = chunk.offset, chunk.offset + chunk.size
         payload = (
@@ -306,7 +306,7 @@ class Parser:
         return self._place(ChunkEvent(chunk, data, thing_of(chunk)))
 
     def _continue_large(self, event: ChunkEvent, crc: int) -> Event:
-        """A large chunk, of which only the part fed last is kept."""
+        """Continue a large chunk; only its last part is in memory."""
         chunk = event.chunk
         covered = chunk.offset + chunk.size - CRC.size
         part = self._data[self.at - self._start : covered - self._start]
@@ -380,11 +380,11 @@ class Parser:
         return event
 
     def _may_skip(self, kind: int, count: int) -> bool:
-        """Return whether a packet of this kind may come so many too early."""
+        """Return True if ``count`` packets may be missing before one of this kind."""
         return count == 0
 
     def _skip(self, count: int) -> None:
-        """Skip so many missing packets; raises FormatError."""
+        """Skip ``count`` missing packets; raises FormatError."""
 
     def _due(self) -> int:
         if not self._is_numbered:  # PACK-14

@@ -110,7 +110,7 @@ class Container:
         return _reopen, (self.source, {n: getattr(self, n) for n in names})
 
     def strictly(self) -> Container:
-        """The same file, checked as a sound one wherever it is read."""
+        """The same file, read with all checks, as an intact one."""
         other = Container.__new__(Container)
         other.__dict__.update(self.__dict__ | {"salvage": False, "verify": True})
         return other
@@ -182,7 +182,7 @@ class Container:
         return read_records(chunks, self.payload, self.source.size, lenient=self.salvage)
 
     def metadata_records(self, name: str) -> list[Record]:
-        """META records of the clip ``name``; "": of the file as a whole."""
+        """META records of the clip ``name``, or of the file if it is ""."""
         row = self.directory.clips.get(name)
         start = row.clip.offset if row is not None else 0
         return [record for at, record in self._records.get(name, ()) if at > start]

@@ -235,7 +235,7 @@ class Salvager(Scanner):
         super()._ancillary(chunk, payload)
 
     def _repeat(self, chunk: Chunk, payload: bytes) -> None:
-        """Use the chunks of a REPT: of the open clip, those that may have been lost."""
+        """Use the chunks of a REPT; within a clip only those that may have been lost."""
         directory = self.result.directory
         if self._doubt and not self._settle_doubt(payload, chunk.offset):
             self._close_clip()
@@ -269,7 +269,7 @@ class Salvager(Scanner):
 
 
 def _is_inside(event: Event) -> bool:
-    """True if more of the chunk follows in other events: of an open DATA."""
+    """Return True for an open DATA and its packets but the end: more of the chunk follows."""
     if isinstance(event, ChunkEvent):
         return event.chunk.length is None
     return isinstance(event, PacketEvent) and event.packet.kind != END

@@ -140,7 +140,7 @@ def build_segment(header: SegmentHeader, streams: Sequence[bytes], extension: by
 
 
 def parse_segment_header(data: bytes) -> tuple[SegmentHeader, int]:
-    """The fields before the table and the offset after them, not yet covered by a checksum."""
+    """Parse the fields before the table, unchecked; return them and the offset after them."""
     at, fields = 0, []
     for _ in range(5):
         value, at = read_varint(data, at)
@@ -384,7 +384,7 @@ MOST_KNOWN, MOST_BYTES = 1024, 64  # notes that are kept, and bytes of one
 
 
 def _group_notes(data: bytes, where: str) -> GroupNotes:
-    """The record of ``data``, which nobody may change: short notes are alike in many groups."""
+    """The record of ``data``; shared, since many groups have equal short notes: read-only."""
     fields = _known.get(data)
     if fields is None:
         fields = parse(GroupNotes, data, where)

@@ -173,7 +173,7 @@ class ByteSource:
 
     def _request(self, offset: int, size: int) -> bytes:
         if self._process != os.getpid():
-            self._forked()
+            self._reset_after_fork()
         if getattr(self._stream, "closed", False):
             raise OptionError("the file is closed", path=self.name)
         data = self._read_stream(offset, size)
@@ -210,7 +210,7 @@ class ByteSource:
             self._stream.seek(offset)
             return self._stream.read(size)
 
-    def _forked(self) -> None:
+    def _reset_after_fork(self) -> None:
         """Replace things that a fork would share: a connection, and a lock perhaps held.
 
         An HttpFile does that itself, with the identity of its file.

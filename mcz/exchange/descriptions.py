@@ -48,7 +48,7 @@ def describe(file: File, clips: Sequence[Clip], form: str) -> tuple[JsonObject, 
 
 def datacite(file: File, clips: Sequence[Clip]) -> JsonObject:
     """Attributes of a DOI in the REST interface of DataCite."""
-    agreed = _agreed(file, clips)
+    agreed = _common_metadata(file, clips)
     days = sorted(filter(None, _values("date", file, clips)))
     licence = agreed.get("licence")
     rights = {"rights": agreed.get("rights") or licence}
@@ -77,12 +77,12 @@ def datacite(file: File, clips: Sequence[Clip]) -> JsonObject:
         "geoLocations": _each(agreed.get("place"), lambda place: {"geoLocationPlace": place}),
         "schemaVersion": "http://datacite.org/schema/kernel-4",
     }
-    return _filled(record)
+    return _without_empty(record)
 
 
 def ro_crate(file: File, clips: Sequence[Clip]) -> JsonObject:
     """``ro-crate-metadata.json`` of a folder that holds the file."""
-    agreed = _agreed(file, clips)
+    agreed = _common_metadata(file, clips)
     licence = agreed.get("licence")
     is_listed = licence is not None and _LICENCE.fullmatch(licence)
     name = re.split(r"[/\\]", file.name)[-1] or "archive.mcz"
@@ -116,8 +116,8 @@ def ro_crate(file: File, clips: Sequence[Clip]) -> JsonObject:
             "conformsTo": {"@id": CRATE},
             "about": {"@id": "./"},
         },
-        _filled(root),
-        _filled(archive),
+        _without_empty(root),
+        _without_empty(archive),
     ]
     for identifier, key in (("#lab", "lab"), ("#holder", "rights-holder")):
         if key in agreed:
@@ -142,7 +142,7 @@ def _clip_entity(identifier: str, clip: Clip) -> JsonObject:
         "locationCreated": metadata.get("place"),
         "license": metadata.get("licence"),
     }
-    return _filled(entity)
+    return _without_empty(entity)
 
 
 def _values(key: str, file: File, clips: Iterable[Clip]) -> set[str]:
@@ -151,7 +151,7 @@ def _values(key: str, file: File, clips: Iterable[Clip]) -> set[str]:
     return {own} if own is not None else {clip.metadata.get(key, "") for clip in clips}
 
 
-def _agreed(file: File, clips: Sequence[Clip]) -> dict[str, str]:
+def _common_metadata(file: File, clips: Sequence[Clip]) -> dict[str, str]:
     """Metadata of the file, and those that all clips have alike."""
     shared = set(clips[0].metadata.items()) if clips else set()
     for clip in clips:
@@ -178,7 +178,7 @@ def _each(text: str | None, make: Callable[[str], object]) -> list[object]:
     return [] if text is None else [make(text)]
 
 
-def _filled(entity: JsonObject) -> JsonObject:
+def _without_empty(entity: JsonObject) -> JsonObject:
     """An entity without its empty properties."""
     return {name: value for name, value in entity.items() if value not in (None, [], "")}
 

@@ -254,7 +254,7 @@ def export(
     with limit_jobs(jobs), open(target, **options) as file:
         chosen = file.select_clips(clips, where)
         called = [clip.name for clip in chosen]
-        with share_clips(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
+        with share_clips(_export_clip, file, called, (to, rate, unit, key_error_mm)) as converting:
             for done, (name, converted) in enumerate(zip(called, converting, strict=True)):
                 run = partial(_as_run, name, converted, written)
                 write(name, run if to == BIDS else converted)
@@ -269,13 +269,13 @@ def export(
 Exported = tuple[str, bytes, tuple[str, ...]]  # name of the file, its content, remarks
 
 
-def _converted(
+def _export_clip(
     shared: tuple[File, tuple[str, Fraction | float | None, str | None, float | None]], name: str
 ) -> list[Exported]:
     """The files that the clip ``name`` becomes."""
     file, (to, rate, unit, key_error) = shared
     clip = file.clips[name]
-    motion = SourceOptions(rate=rate, unit=unit).completing(clip.motion())
+    motion = SourceOptions(rate=rate, unit=unit).complete(clip.motion())
     return list(_files(clip, to, motion, key_error))
 
 
@@ -301,11 +301,11 @@ def _as_run(
 def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Exported]:
     """The files that a clip becomes: an ASF before the AMC that needs it."""
     if to in EXPORTS:
-        yield _named(clip, to), EXPORTS[to](table_of(motion)), conversion_losses(motion, to)
+        yield _file_name(clip, to), EXPORTS[to](table_of(motion)), conversion_losses(motion, to)
         return
     if to in WRITERS:
         scene = to_scene(motion, to, key_error_mm=key_error)
-        yield _named(clip, to), scene.data, scene.notes
+        yield _file_name(clip, to), scene.data, scene.notes
         return
     if to == BIDS:
         for path, data in clip_files(motion).items():
@@ -314,10 +314,10 @@ def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iter
     files = converted_files(motion, to, None, True)
     for suffix in sorted(files, reverse=True):
         notes = conversion_losses(motion, to) if suffix == to else ()
-        yield _named(clip, suffix), files[suffix], notes
+        yield _file_name(clip, suffix), files[suffix], notes
 
 
-def _named(clip: Clip, to: str) -> str:
+def _file_name(clip: Clip, to: str) -> str:
     """The clip's name with the suffix of the format ``to``, unless it has one."""
     suffixes = suffixes_of(to)
     own = PurePosixPath(clip.name).suffix.lower()

@@ -46,7 +46,7 @@ def digests(path: Path, algorithms: Iterable[str] = ALGORITHMS) -> dict[str, str
 
 def manifest_text(digest_of: Mapping[str, str]) -> str:
     """A manifest of the paths in ``digest_of``, in their order."""
-    return "".join(f"{digest}  {_escaped(path)}\n" for path, digest in digest_of.items())
+    return "".join(f"{digest}  {_escape_path(path)}\n" for path, digest in digest_of.items())
 
 
 def read_manifest(text: str) -> Iterator[tuple[str, str]]:
@@ -57,7 +57,7 @@ def read_manifest(text: str) -> Iterator[tuple[str, str]]:
         match = _LINE.fullmatch(line)
         if match is None:
             raise OptionError(f"line {number} is not a digest and a path: {line[:80]!r}")
-        yield _unescaped(match[2]), match[1].lower()
+        yield _unescape_path(match[2]), match[1].lower()
 
 
 def is_inside(path: str) -> bool:
@@ -95,11 +95,11 @@ def read_tags(text: str) -> list[tuple[str, str]]:
     return pairs
 
 
-def _escaped(path: str) -> str:
+def _escape_path(path: str) -> str:
     return re.sub(r"[%\r\n]", lambda match: _ESCAPES[match[0]], path)
 
 
-def _unescaped(path: str) -> str:
+def _unescape_path(path: str) -> str:
     return re.sub(r"%(0[AaDd]|25)", lambda match: chr(int(match[1], 16)), path)
 
 
@@ -207,7 +207,7 @@ class _BagValidator:
                 yield (Path(folder) / file).relative_to(root).as_posix()
 
     def _read_manifests(self) -> tuple[dict[str, dict[str, str]], dict[str, dict[str, str]]]:
-        """The digests that the manifests state, by algorithm and path: of payload and of tags."""
+        """The digests in the manifests of payload and tags, by algorithm and path."""
         payload: dict[str, dict[str, str]] = {}
         tags: dict[str, dict[str, str]] = {}
         for name in sorted(path.name for path in self.check.folder.iterdir()):

@@ -83,11 +83,14 @@ def map_clips(
                 "the machines of a cluster can open none of these files", path=file.name
             )
         names = [clip.name for clip in file.select_clips(where=where)]
-        with use_engine(Cluster(used)), share_clips(_mapped, file, names, function) as answers:
+        with (
+            use_engine(Cluster(used)),
+            share_clips(_call_on_clip, file, names, function) as answers,
+        ):
             return [answer() for answer in answers]
 
 
-def _mapped(shared: tuple[File, Callable[[Clip], Result]], name: str) -> Result:
+def _call_on_clip(shared: tuple[File, Callable[[Clip], Result]], name: str) -> Result:
     file, function = shared
     return function(file.clips[name])
 
@@ -142,9 +145,9 @@ class Task:
 
     def __init__(self, client: Client, key: str, packed: bytes, item: object) -> None:
         self._client, self._key, self._call = client, key, (run_task, packed, item)
-        self.future = self._submitted(0)
+        self.future = self._submit(0)
 
-    def _submitted(self, again: int) -> Future:
+    def _submit(self, again: int) -> Future:
         return self._client.submit(*self._call, key=f"{self._key}-{again}", retries=RETRIES)
 
     def answer(self) -> Any:
@@ -157,7 +160,7 @@ class Task:
                 # the task that ended it may be over.
                 if again == TRIES:
                     raise
-                self.future = self._submitted(again)
+                self.future = self._submit(again)
                 continue
             if not went_well:
                 raise value
@@ -248,7 +251,7 @@ def pack(
     """
     root = os.fspath(root)
     files, others = list_files(root, target)
-    names, left = _chosen(files, keep_all)
+    names, left = _choose_files(files, keep_all)
     options = SourceOptions(
         rate=rate,
         force_rate=force_rate,
@@ -280,7 +283,7 @@ def pack(
     return report
 
 
-def _chosen(files: Sequence[Entry], keep_all: bool) -> tuple[list[Entry], list[Outcome]]:
+def _choose_files(files: Sequence[Entry], keep_all: bool) -> tuple[list[Entry], list[Outcome]]:
     motions, _ = motion_files([Path(one.name) for one in files])
     known = {path.as_posix() for path in motions}
     left = [Outcome(o.name, "skipped", o.size, NO_MOTION) for o in files if o.name not in known]
@@ -320,8 +323,8 @@ def list_files(root: str, target: Target) -> tuple[list[Entry], list[Outcome]]:
         paths, others = files_below(folder, target)
         files = [Entry(path.relative_to(folder).as_posix(), size_of(path)) for path in paths]
         return files, others
-    fs, base = _opened(root)
-    own = _opened(str(target))[1] if is_url(str(target)) else None
+    fs, base = _open_folder(root)
+    own = _open_folder(str(target))[1] if is_url(str(target)) else None
     try:
         details = fs.find(base, detail=True)
     except Exception as error:  # each kind of store has errors of its own
@@ -336,7 +339,7 @@ def list_files(root: str, target: Target) -> tuple[list[Entry], list[Outcome]]:
     return sorted(files, key=lambda one: os.fsencode(one.name)), []
 
 
-def _opened(url: str) -> tuple[Any, str]:
+def _open_folder(url: str) -> tuple[Any, str]:
     """The file system of a URL and the path of its folder in it; raises OptionError."""
     fs, path = file_system(url)
     return fs, path.rstrip("/")
@@ -370,25 +373,27 @@ def encode_remotely(profile: Profile, ask: RemoteFile) -> Part:
             part = encode_part(profile, own_path)
         except MczError as error:
             if error.path is not None:
-                error.path = _named(error.path, root, ask.root)
+                error.path = _rename_copy(error.path, root, ask.root)
             raise
     done = part.encoder
-    done.reason, done.remark = (_named(text, root, ask.root) for text in (done.reason, done.remark))
-    done.notes = tuple(_named(note, root, ask.root) for note in done.notes)
+    done.reason, done.remark = (
+        _rename_copy(text, root, ask.root) for text in (done.reason, done.remark)
+    )
+    done.notes = tuple(_rename_copy(note, root, ask.root) for note in done.notes)
     done.inputs = []
     return part
 
 
-def _named(text: str, place: str, root: str) -> str:
+def _rename_copy(text: str, place: str, root: str) -> str:
     """``text`` about a copy, with the name of the file itself."""
     if isinstance(text, Remark):
-        return Remark(_named(text.words, place, root), text.hint)
+        return Remark(_rename_copy(text.words, place, root), text.hint)
     return text.replace(place, root.rstrip("/"))
 
 
 def _fetch(ask: RemoteFile, folder: Path) -> None:
     """Copy the file, and the skeletons that it may need, below ``folder``."""
-    fs, base = _opened(ask.root)
+    fs, base = _open_folder(ask.root)
     for name in (ask.encoder.name, *ask.beside):
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)

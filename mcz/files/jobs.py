@@ -1,8 +1,8 @@
-"""Processes that work on the files of a command, or the clips of a file; results in order.
+"""Parallel processes for the files of a command or the clips of a file; results in order.
 
-Parsing is Python, which threads of one process share and processes do not: packing takes half the
-time with two, and so does restoring and hashing texts of clips: a lossless archive is verified and
-unpacked in about two thirds of the time that two threads take. Results do not depend on the number.
+Parsing is Python, which runs in parallel only in processes: two of them pack in half the time, and
+verify and unpack a lossless archive in two thirds of the time of two threads. Results do not depend
+on their number.
 
 They are separate interpreters, started without the caller's main module, so that a script needs no
 guard and running threads are not forked. If a process dies, its work is repeated by another one.
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from mcz.files.reading.file import File
 
 LEAST_BYTES = 8_000_000  # of source files; fewer are done before a worker has started
-LEAST_STORED = 2_000_000  # the same, of an MCZ file
+LEAST_STORED = 2_000_000  # the same for an MCZ file
 DEFAULT_JOBS = 1  # a library must not start processes unasked
 
 Item = TypeVar("Item")
@@ -59,7 +59,7 @@ class Engine(Protocol):
 
 
 _ENGINE: ContextVar[Engine | None] = ContextVar("engine", default=None)
-_LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)  # of processes of a call
+_LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)  # most processes of a call
 
 
 @contextmanager
@@ -78,13 +78,13 @@ def limit_jobs(jobs: int | None) -> Iterator[None]:
 
 
 def engine() -> Engine | None:
-    """Engine that works in place of processes of this machine, if any."""
+    """The engine in use instead of processes of this machine, if any."""
     return _ENGINE.get()
 
 
 @contextmanager
 def use_engine(engine: Engine) -> Iterator[None]:
-    """Let ``engine`` do the work of calls within the block, of any size."""
+    """Let ``engine`` do the work of all calls within the block, however small."""
     token = _ENGINE.set(engine)
     try:
         yield
@@ -93,14 +93,14 @@ def use_engine(engine: Engine) -> Iterator[None]:
 
 
 def useful_jobs(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
-    """Number of processes that is worthwhile for so many files of so many bytes in all.
+    """Number of processes worth starting for ``n_items`` files of ``n_bytes`` in all.
 
-    ``stored``: they are clips of an MCZ file of that size.
+    ``stored``: the items are clips of an MCZ file of that size.
     """
-    if (other := engine()) is not None:
-        return max(other.jobs, DEFAULT_JOBS + 1)
+    if (in_use := engine()) is not None:
+        return max(in_use.jobs, DEFAULT_JOBS + 1)
     least = LEAST_STORED if stored else LEAST_BYTES
-    if n_bytes < least or getattr(sys, "frozen", False):  # has no interpreter to start
+    if n_bytes < least or getattr(sys, "frozen", False):  # a frozen program cannot start Python
         return DEFAULT_JOBS
     return max(DEFAULT_JOBS, min(_LIMIT.get() or DEFAULT_JOBS, n_items))
 
@@ -115,8 +115,10 @@ class Pool:
 
     def __init__(self, jobs: int, state: object = None) -> None:
         self.jobs = jobs
-        n_threads = max(1, threads.thread_limit() // jobs)  # of each: together as many as of one
-        self._first = pickle.dumps((n_threads, pickle.dumps(state, pickle.HIGHEST_PROTOCOL)))
+        n_threads = max(
+            1, threads.thread_limit() // jobs
+        )  # of each process; all together have as many as one
+        self._setup = pickle.dumps((n_threads, pickle.dumps(state, pickle.HIGHEST_PROTOCOL)))
         self._free: SimpleQueue[Worker | None] = SimpleQueue()
         for _ in range(jobs):
             self._free.put(None)  # started on its first work
@@ -159,15 +161,15 @@ class Pool:
             yield _answer(waiting.popleft())
 
     def _call(self, function: Callable[[Any, Item], Result], item: Item) -> Result:
-        """One call, in a thread of its own, by a process that is free."""
+        """Call in a free process; runs in a thread of its own."""
         message = pickle.dumps((function, item), pickle.HIGHEST_PROTOCOL)
         for _ in range(TRIES):
-            worker = self._free.get() or self._started()
+            worker = self._free.get() or self._start_worker()
             reply = worker.ask(message)
             if reply is not None:
                 self._free.put(worker)
-                went_well, value = pickle.loads(reply)
-                if not went_well:
+                is_result, value = pickle.loads(reply)
+                if not is_result:
                     raise value
                 return cast(Result, value)
             worker.end()
@@ -175,16 +177,16 @@ class Pool:
                 self._workers.discard(worker)
             self._free.put(None)
         raise WorkerError(
-            f"the process that worked on it ended unexpectedly ({worker.code}), {TRIES} "
+            f"the process that worked on it ended unexpectedly ({worker.exit_text}), {TRIES} "
             "times; perhaps too little memory is free",
             hint=Hint.JOBS,
         )
 
-    def _started(self) -> Worker:
+    def _start_worker(self) -> Worker:
         with self._lock:
             if self._closed:
                 raise WorkerError("the work was cancelled")
-            worker = Worker(self._first)
+            worker = Worker(self._setup)
             self._workers.add(worker)
             return worker
 
@@ -196,28 +198,28 @@ def _answer(future: Future[Result] | None) -> Answer[Result] | None:
 class Worker:
     """One process, and its two pipes."""
 
-    def __init__(self, first: bytes) -> None:
-        code = "from mcz.files.jobs import main; main()"
-        code = f"import sys; sys.path[:] = {sys.path!r}; {code}"
+    def __init__(self, setup: bytes) -> None:
+        script = "from mcz.files.jobs import main; main()"
+        script = f"import sys; sys.path[:] = {sys.path!r}; {script}"
         self.process = subprocess.Popen(
-            [sys.executable, "-c", code],
+            [sys.executable, "-c", script],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | ONE_THREAD,
             **_SEPARATE_GROUP,
         )
-        with suppress(OSError):  # it has died already, as its first request will show
-            send(cast(BinaryIO, self.process.stdin), first)
+        with suppress(OSError):  # the process has died; its first request reports it
+            send(cast(BinaryIO, self.process.stdin), setup)
 
     @property
-    def code(self) -> str:
+    def exit_text(self) -> str:
         code = self.process.poll()
         if code is None:
-            return "without a word"
+            return "without an exit code"
         return f"exit code {code}" if code >= 0 else f"signal {-code}"
 
     def ask(self, message: bytes) -> bytes | None:
-        """The reply, None if the process has died."""
+        """Send a message; return the reply, None if the process has died."""
         try:
             send(cast(BinaryIO, self.process.stdin), message)
             reply = receive(cast(BinaryIO, self.process.stdout))
@@ -253,9 +255,9 @@ def answers(
     state: object = None,
 ) -> Iterator[Iterator[Answer[Result] | None]]:
     """``Pool.in_order`` of a pool for this call, or of the engine in use."""
-    other = engine()
-    if other is not None:
-        with closing(other.in_order(function, items, state)) as results:
+    in_use = engine()
+    if in_use is not None:
+        with closing(in_use.in_order(function, items, state)) as results:
             yield results
         return
     with Pool(jobs, state) as pool:
@@ -282,18 +284,21 @@ def receive(stream: BinaryIO) -> bytes | None:
 
 
 def main() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends it
+    """Answer requests of the parent process until it closes the pipe."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    first = receive(sys.stdin.buffer)
-    if first is None:
+    setup = receive(sys.stdin.buffer)
+    if setup is None:
         return
     from mcz.model.threads import limit_threads
 
-    n_threads, packed = pickle.loads(first)
+    n_threads, packed = pickle.loads(setup)
     with limit_threads(n_threads):
-        state = cache(partial(pickle.loads, packed))  # of all calls; the first may raise its error
-        with suppress(BrokenPipeError):  # it was killed, and needs no answer
+        state = cache(
+            partial(pickle.loads, packed)
+        )  # unpickled at the first call, which reports its error
+        with suppress(BrokenPipeError):  # the parent has gone
             while (message := receive(sys.stdin.buffer)) is not None:
                 send(replies, _reply_to(state, message))
 
@@ -353,17 +358,17 @@ def _check_and_call(
 
 
 def can_be_shared(file: File) -> bool:
-    """Return True if another process would read the same in the file.
+    """Return True if another process can open the same file.
 
-    Not in one that was opened as a stream, that grows, or whose clips salvage found.
+    False for streams, growing files and clips found by salvage.
     """
     container = file.container
     if container.salvage or file.damage or file.grows or container.source.target is None:
         return False
-    return only_own()
+    return has_only_builtins()
 
 
-def only_own() -> bool:
+def has_only_builtins() -> bool:
     """Return True if every codec and format is built in, so that another process has it."""
     formats = all(source.read.__module__.startswith(PACKAGE) for source in FORMATS.values())
     return formats and set(CODECS) <= set(ENTRIES)

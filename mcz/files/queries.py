@@ -31,7 +31,7 @@ from mcz.files.query_tree import (
     as_number,
     is_equality,
     names_in,
-    printed,
+    print_query,
     truth_of,
 )
 from mcz.model.text_format import nearest_names, quote_name, suggest_names
@@ -57,12 +57,12 @@ class Query:
         return f"<Query {quote_name(self.text)}>"
 
     def __str__(self) -> str:
-        """The same query with the fewest blanks and parentheses."""
-        return printed(self.tree)
+        """The query as text, with as few blanks and parentheses as possible."""
+        return print_query(self.tree)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names that occur, each once, in their order."""
+        """The names in the query, each once, in order."""
         return tuple(dict.fromkeys(names_in(self.tree)))
 
     def matches(self, lookup: Lookup) -> bool:
@@ -115,7 +115,7 @@ class _Parser:
         self.at += is_next
         return is_next
 
-    def expected(self, noun: str) -> OptionError:
+    def expected_error(self, noun: str) -> OptionError:
         """The error for another token here."""
         word = self.token.raw.lower()
         hint = f"; write {word}" if self.token.kind == "name" and word in WORDS else ""
@@ -126,7 +126,7 @@ class _Parser:
             raise OptionError("where: the query is empty")
         node = self.disjunction()
         if self.token.kind != "end":
-            raise self.expected("'and', 'or' or the end")
+            raise self.expected_error("'and', 'or' or the end")
         return node
 
     def disjunction(self) -> Node:
@@ -155,25 +155,25 @@ class _Parser:
         self.skip("(")
         node = self.disjunction()
         if not self.skip(")"):
-            raise self.expected("'and', 'or' or )")
+            raise self.expected_error("'and', 'or' or )")
         return node
 
     def comparison(self) -> Node:
         left = self.operand()
         if self.token.raw in COMPARISONS:
-            return self.compared(left)
+            return self.parse_comparison(left)
         if self.token.raw == "is":
-            return self.missing(left)
+            return self.parse_missing(left)
         denied = self.skip("not")
         if self.skip("in"):
             node: Node = In(left, self.list())
         elif self.skip("like"):
             node = Like(left, self.pattern())
         else:
-            raise self.expected("in or like" if denied else _what_follows(left))
+            raise self.expected_error("in or like" if denied else _what_follows(left))
         return Not(node) if denied else node
 
-    def compared(self, left: Operand) -> Node:
+    def parse_comparison(self, left: Operand) -> Node:
         sign = self.next()
         right = self.operand()
         if not is_equality(sign.raw) and (_is_truth(left) or _is_truth(right)):
@@ -189,13 +189,13 @@ class _Parser:
         last = self.tokens[self.at + 1].raw or "..."
         return f"{left} {sign.raw} {right} and {right} {self.token.raw} {last}"
 
-    def missing(self, left: Operand) -> Node:
+    def parse_missing(self, left: Operand) -> Node:
         word = self.next()
         if not isinstance(left, Name):
             raise fault(self.text, word.at, "only a name can be missing")
         present = self.skip("not")
         if not self.skip("missing"):
-            raise self.expected("missing" if present else "missing or not missing")
+            raise self.expected_error("missing" if present else "missing or not missing")
         return Not(Missing(left)) if present else Missing(left)
 
     def operand(self) -> Operand:
@@ -208,23 +208,23 @@ class _Parser:
             return Literal(self.next().value)
         if self.token.raw in ("true", "false"):
             return Literal(self.next().raw == "true")
-        raise self.expected(label)
+        raise self.expected_error(label)
 
     def list(self) -> tuple[Literal, ...]:
         closing = CLOSING.get(self.token.raw)
         if closing is None:
-            raise self.expected("a list such as ('05', '06')")
+            raise self.expected_error("a list such as ('05', '06')")
         self.next()
         literals = [self.literal("a number or a text in quotes")]
         while self.skip(","):
             literals.append(self.literal("a number or a text in quotes"))
         if not self.skip(closing):
-            raise self.expected(f", or {closing}")
+            raise self.expected_error(f", or {closing}")
         return tuple(literals)
 
     def pattern(self) -> str:
         if self.token.kind != "text":
-            raise self.expected("a pattern in quotes, such as '05_*'")
+            raise self.expected_error("a pattern in quotes, such as '05_*'")
         return str(self.next().value)
 
 
@@ -233,7 +233,9 @@ def _is_truth(operand: Operand) -> bool:
 
 
 def _what_follows(left: Operand) -> str:
-    return f"a comparison such as {printed(left)} == {'true' if isinstance(left, Name) else '...'}"
+    return (
+        f"a comparison such as {print_query(left)} == {'true' if isinstance(left, Name) else '...'}"
+    )
 
 
 LONGEST = 4096  # characters of a query
@@ -290,7 +292,7 @@ def tokens(text: str) -> Iterator[Token]:
     while at < len(text):
         match = _TOKEN.match(text, at)
         if match is None:
-            raise fault(text, at, _nothing_known(text[at]))
+            raise fault(text, at, _unknown_letter(text[at]))
         kind, raw = str(match.lastgroup), match[0]
         if kind != "blank":
             yield _token(kind, at, raw, text)
@@ -298,7 +300,7 @@ def tokens(text: str) -> Iterator[Token]:
     yield Token("end", at, "")
 
 
-def _nothing_known(letter: str) -> str:
+def _unknown_letter(letter: str) -> str:
     if letter in "'\"":
         return f"the text that begins with {letter} has no end"
     return f"{quote_name(letter)} means nothing here"
@@ -307,7 +309,7 @@ def _nothing_known(letter: str) -> str:
 def _token(kind: str, at: int, raw: str, text: str) -> Token:
     match kind:
         case "text":
-            return Token(kind, at, raw, _unescaped(at, raw, text))
+            return Token(kind, at, raw, _unescape(at, raw, text))
         case "number":
             number = as_number(raw)
             if number is None:
@@ -322,7 +324,7 @@ def _token(kind: str, at: int, raw: str, text: str) -> Token:
             return Token(kind, at, raw, raw)
 
 
-def _unescaped(at: int, raw: str, text: str) -> str:
+def _unescape(at: int, raw: str, text: str) -> str:
     r"""Unescape a quoted text: \' \" and \\ are the only escapes."""
     for match in _ESCAPE.finditer(raw):
         if match[1] not in "'\"\\":

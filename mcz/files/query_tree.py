@@ -225,10 +225,10 @@ def names_in(node: Node | Operand) -> Iterator[str]:
                 yield from names_in(part)
 
 
-def printed(node: Node | Operand) -> str:
+def print_query(node: Node | Operand) -> str:
     """The text that the parser turns into this tree.
 
-    >>> printed(Not(And((Missing(Name("subject")), Like(Name("name"), "it's *")))))
+    >>> print_query(Not(And((Missing(Name("subject")), Like(Name("name"), "it's *")))))
     "not (subject is missing and name like 'it\\\\'s *')"
     """
     match node:
@@ -237,26 +237,26 @@ def printed(node: Node | Operand) -> str:
         case Literal(value):
             return _literal(value)
         case Compare(left, sign, right):
-            return f"{printed(left)} {sign} {printed(right)}"
+            return f"{print_query(left)} {sign} {print_query(right)}"
         case In(operand, literals):
-            return f"{printed(operand)} in ({', '.join(map(printed, literals))})"
+            return f"{print_query(operand)} in ({', '.join(map(print_query, literals))})"
         case Like(operand, pattern):
-            return f"{printed(operand)} like {_literal(pattern)}"
+            return f"{print_query(operand)} like {_literal(pattern)}"
         case Missing(operand):
-            return f"{printed(operand)} is missing"
+            return f"{print_query(operand)} is missing"
         case Not(part):
             return f"not {_operand_text(part)}"
         case And(parts):
             return " and ".join(map(_operand_text, parts))
         case Or(parts):
             return " or ".join(
-                printed(p) if isinstance(p, And) else _operand_text(p) for p in parts
+                print_query(p) if isinstance(p, And) else _operand_text(p) for p in parts
             )
 
 
 def _operand_text(part: Node) -> str:
     """An operand of ``and``, ``or`` or ``not``."""
-    return f"({printed(part)})" if isinstance(part, And | Or) else printed(part)
+    return f"({print_query(part)})" if isinstance(part, And | Or) else print_query(part)
 
 
 def _literal(value: str | bool | int | float) -> str:

@@ -87,7 +87,7 @@ def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> l
 
 
 def is_number(joint: Joint) -> bool:
-    """Return whether a joint is a column of a table: one plain scalar without a name of its own."""
+    """Return True for a joint that is one plain scalar without a name, a column of a table."""
     return [(channel.kind, channel.label) for channel in joint.channels] == [("", "value")]
 
 

@@ -40,9 +40,8 @@ def whole_turns(steps: Floats, full: float) -> Floats:
 class Unwrapper:
     """Removes whole turns from the rotation channels of a signal, given block after block.
 
-    Rotation vectors and quaternions follow each other likewise, by the equivalents of their
-    rotations. If the skeleton's angle unit is unknown, angles are not changed: the size of a
-    turn is unknown.
+    Rotation vectors and quaternions become the equivalents nearest to the previous frame. If the
+    skeleton's angle unit is unknown, angles are not changed: the size of a turn is unknown.
     """
 
     def __init__(self, skeleton: Skeleton, channels: Sequence[Channel] | None = None) -> None:
@@ -109,7 +108,7 @@ def unwrap(values: Floats, skeleton: Skeleton, channels: Sequence[Channel] | Non
 def without_turns(
     differences: Floats, skeleton: Skeleton, channels: Sequence[Channel] | None = None
 ) -> Floats:
-    """Differences of two signals, (n_rows, n_channels), of rotations without whole turns.
+    """Differences of two signals, (n_rows, n_channels), without whole turns of rotations.
 
     A new array; a difference of ``BEYOND`` or more is not changed.
     """
@@ -160,7 +159,7 @@ class VectorFollower:
         own = vectors[rows]
         last = own[:1] if self._last is None else self._last[None]
         counts = _turns(own, np.concatenate([last, own[:-1]]), self._full)[0]
-        if counts.any():  # rare: each row depends on the one before
+        if counts.any():  # rare; each row depends on the previous one
             first = int(np.flatnonzero(counts)[0])
             before = own[first - 1] if first else last[0]
             for row in range(first, len(own)):
@@ -172,7 +171,7 @@ class VectorFollower:
 
 
 class SignKeeper:
-    """Gives one quaternion the sign that keeps it near the one before, block after block."""
+    """Gives a quaternion the sign that keeps it near the previous one, block after block."""
 
     def __init__(self) -> None:
         self._last: Floats | None = None
@@ -219,19 +218,19 @@ def without_whole_turns(
     """
     full = {"deg": 360.0, "rad": 2 * math.pi}.get(skeleton.angle_unit, 0.0)
     for columns in vectors_of(skeleton) if full else []:
-        rows = _known(original, decoded, columns)
+        rows = _known_rows(original, decoded, columns)
         target = original[np.ix_(rows, columns)]
         differences[np.ix_(rows, columns)] = (
             nearest(decoded[np.ix_(rows, columns)], target, full) - target
         )
     for columns in quaternions_of(skeleton):
-        rows = _known(original, decoded, columns)
+        rows = _known_rows(original, decoded, columns)
         one, other = original[np.ix_(rows, columns)], decoded[np.ix_(rows, columns)]
         signs = np.where((one * other).sum(axis=1) < 0, -1.0, 1.0)
         differences[np.ix_(rows, columns)] = other * signs[:, None] - one
     return differences
 
 
-def _known(original: Floats, decoded: Floats, columns: Ints) -> Ints:
+def _known_rows(original: Floats, decoded: Floats, columns: Ints) -> Ints:
     part = (np.abs(original[:, columns]) < BEYOND) & (np.abs(decoded[:, columns]) < BEYOND)
     return np.flatnonzero(part.all(axis=1)).astype(np.int64)

@@ -233,7 +233,7 @@ class Chain:
         return axes
 
     def _arm(self, link: Link, columns: Floats) -> Floats:
-        """From the parent's origin to the joint's own, lengthened by the parent, not yet scaled."""
+        """From the parent's origin to the joint's, lengthened by the parent, before scaling."""
         arm = link.offset[:, None]
         if link.moves:
             arm = np.repeat(arm, columns.shape[1], axis=1)

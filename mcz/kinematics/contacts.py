@@ -1,7 +1,8 @@
 """Contacts: in which frames a foot stands. docs/guides/contacts.md is normative.
 
-A foot stands where its point is slow and near its lowest height. Two thresholds each avoid flicker:
-a run below the wider ones is a contact if both are below the narrower ones somewhere in it.
+A foot stands where its point is slow and near its lowest height. Each limit has two thresholds,
+against flicker: a run below the wider ones is a contact if it is below both narrower ones in some
+frame.
 """
 
 from __future__ import annotations

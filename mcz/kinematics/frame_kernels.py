@@ -1,4 +1,4 @@
-"""Compiled: the poses of frames, one after the other, of skeletons that only turn and move.
+"""Compiled: poses, frame by frame, of skeletons whose joints only turn and move.
 
 ``chain.py`` has the same steps for every kind of channel. Imported on first use only.
 """

@@ -95,7 +95,7 @@ _OTHER = {
 
 
 def counterparts(names: Sequence[str], pairs: Mapping[str, str] | None = None) -> list[int]:
-    """Counterpart of every joint on the other side, by index; itself for one without a side.
+    """Index of every joint's counterpart on the other side; its own without a side.
 
     ``names`` are the names of all joints, each once. ``pairs`` maps names to names, in one
     direction or both, with precedence; a joint without a side maps to its own name. Raises
@@ -156,7 +156,7 @@ def _mate(name: str, names: Mapping[str, int]) -> str | None:
 
 
 def _swap_sides(pattern: re.Pattern[str], name: str) -> Iterator[str]:
-    """The name with its sides swapped: all of them, then each alone."""
+    """Yield the name with all its sides swapped, then with each one swapped."""
     if pattern.search(name):
         yield pattern.sub(lambda match: _OTHER[match[0]], name)
     for match in pattern.finditer(name):

@@ -55,7 +55,7 @@ def positions_of(skeleton: Skeleton, values: Floats) -> Floats:
 
 
 def origins_of(skeleton: Skeleton, values: Floats) -> Floats:
-    """Origins of the joints, whatever the point set, float64 (n_frames, n_joints, 3)."""
+    """Origins of the joints, for any point set, float64 (n_frames, n_joints, 3)."""
     origins = np.empty((len(values), skeleton.n_joints, 3))
     for rows, _, pose in chain_of(skeleton).poses(values):
         for joint, origin in enumerate(pose.origins):

@@ -79,7 +79,7 @@ def note_on_height(height: float, unit_cm: float) -> str:
     """
     if PEOPLE_CM[0] <= height * unit_cm <= PEOPLE_CM[1]:
         return ""
-    # Halves up, of the decimals that are shown: 27.5 units of 2.54 cm are 69.9 cm.
+    # Halves of the printed decimals round up: 27.5 units of 2.54 cm are 69.9 cm.
     height_cm = Decimal(f"{height * unit_cm:.6g}").quantize(Decimal("0.1"), ROUND_HALF_UP)
     return (
         f"height {height:.3g} units = {height_cm:,} cm, which is not human; "

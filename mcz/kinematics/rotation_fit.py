@@ -1,7 +1,7 @@
 """Fit of a joint's rotation channels to a target rotation.
 
-One angle at a time, then damped Gauss-Newton steps, each frame with its own damping, if that
-converges slowly: at two axes that fall together.
+One angle at a time; near gimbal lock, where this converges slowly, then by Gauss-Newton steps with
+a damping for each frame.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ SWEEPS = 12
 
 
 def set_turns(link: Link, moment: Floats, columns: Floats, radians: float) -> None:
-    """Set a joint's rotation channels so that R' ``moment`` has the greatest trace.
+    """Set a joint's rotation channels to the R that maximizes the trace of R' ``moment``.
 
-    ``moment`` has shape (3, 3, F) and is along the joint's own axes; ``columns``, (n_channels, F)
-    in source units, are written. If ``moment`` is a rotation, R is the nearest to it. A
-    quaternion, or else a rotation vector, determines R alone.
+    R is the joint's rotation. ``moment`` (3, 3, F) is in the joint's own axes; if it is a rotation,
+    R is the nearest one. ``columns``, (n_channels, F) in source units, are written. A quaternion,
+    or else a rotation vector, determines R alone.
     """
     if link.is_whole:
         columns[link.turning] = 0.0
@@ -55,9 +55,9 @@ def _nearest_rotations(moment: Floats) -> Floats:
 
 
 def smallest_angles(angles: Floats) -> Floats:
-    """The same rotations by angles (n_frames, 3) nearer to zero overall, equally continuous.
+    """Equivalent angles (n_frames, 3) that are nearer to zero overall, and as continuous.
 
-    Three angles (a, b, c) about different axes turn as (a + pi, pi - b, c + pi) do.
+    Angles (a, b, c) about three axes are equivalent to (a + pi, pi - b, c + pi).
     """
     both = [center_angles(angles), center_angles(angles * [1, -1, 1] + np.pi)]
     return min(both, key=lambda angles: float((angles * angles).sum()))
@@ -72,7 +72,7 @@ def center_angles(angles: Floats) -> Floats:
 
 
 def quaternions_of(turns: Floats) -> Floats:
-    """The quaternions (w, x, y, z), (4, F), of rotation matrices, each near the one before."""
+    """Quaternions (w, x, y, z), (4, F), of rotation matrices, each near the previous one."""
     parts = quaternions_of_matrices(turns)
     signs = np.where((parts[:, 1:] * parts[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
     signs = np.cumprod(np.concatenate([np.where(parts[0, :1] < 0, -1.0, 1.0), signs]))
@@ -82,7 +82,8 @@ def quaternions_of(turns: Floats) -> Floats:
 def _angle_by_angle(axes: list[int], moment: Floats) -> Floats:
     """Angles (n, F) about turned axes, first to last, for the greatest trace of R' ``moment``.
 
-    The best of several starts; each angle in turn is set to the best for the others as they are.
+    The best of several starts; each sweep sets one angle after another to the optimum for the
+    present others.
     """
     n_frames = moment.shape[2]
     best = np.zeros((len(axes), n_frames))
@@ -93,7 +94,7 @@ def _angle_by_angle(axes: list[int], moment: Floats) -> Floats:
         for _ in range(SWEEPS if len(axes) > 1 else 1):
             for k, axis in enumerate(axes):
                 between = moment
-                for before in range(k):  # T1' moment, then T2' T1' moment
+                for before in range(k):  # undo the turns on the left, outermost first
                     between = _rotate_left(between, axes[before], -angles[before])
                 for after in range(len(axes) - 1, k, -1):
                     between = rotate_axes(between, axes[after], -angles[after])
@@ -112,8 +113,8 @@ def _rotate_left(matrix: Floats, axis: int, angle: Floats) -> Floats:
 
 
 STEPS = 40
-FLAT = 1e-14  # of the gradient, whose greatest is about 1: no further gain
-ROUNDING = 1e-15  # of the trace: smaller differences are rounding
+FLAT = 1e-14  # gradient, at most about 1, below which steps gain nothing
+ROUNDING = 1e-15  # smaller differences of the trace are rounding
 START_DAMPING, EASIER, HARDER = 1e-3, 0.1, 10.0
 
 
@@ -147,7 +148,7 @@ def polish_turns(link: Link, target: Floats, columns: Floats, radians: float) ->
 
 
 def _turn(axes: list[int], angles: Floats) -> tuple[Floats, Floats]:
-    """Rotation by ``angles`` (n, F), (3, 3, F), and the axis of each, (n, 3, F)."""
+    """The rotation by ``angles`` (n, F), (3, 3, F), and the axis of each angle, (n, 3, F)."""
     rotation = np.broadcast_to(IDENTITY, (3, 3, angles.shape[1]))
     spins = np.empty((len(axes), 3, angles.shape[1]))
     for number, axis in enumerate(axes):
@@ -157,7 +158,7 @@ def _turn(axes: list[int], angles: Floats) -> tuple[Floats, Floats]:
 
 
 def _nearness(rotation: Floats, target: Floats) -> Floats:
-    """The trace of R' M, 3 if they are equal, (F,)."""
+    """The trace of rotation' target, (F,): 3 if they are equal."""
     result: Floats = (rotation * target).sum(axis=(0, 1))
     return result
 

@@ -112,11 +112,10 @@ def vectors_of_quaternions(quaternions: Floats) -> Floats:
 
 
 def continuous(vectors: Floats) -> Floats:
-    """The same rotations by vectors each near the one before, (3, F).
+    """Equivalent rotation vectors, each near the previous one, (3, F).
 
-    v and v (1 + 2 pi n / |v|) turn alike. The first is the shortest; each other is the
-    one nearest to the vector before. If v is 0, the axis of the
-    vector before is used. Vectors that are not finite are skipped.
+    v and v (1 + 2 pi n / |v|) turn alike. The first is the shortest; each other one is nearest to
+    the previous vector, whose axis serves if v is 0. Vectors that are not finite are skipped.
     """
     out = np.array(vectors, np.float64)
     last: Any = np.zeros(3)
@@ -158,9 +157,9 @@ def euler_order(turns: Floats) -> str:
 def euler_angles(turns: Floats, order: str) -> Floats:
     """Angles in radians, (n_frames, 3), about the turned axes of ``order``, that make ``turns``.
 
-    Of the two solutions of each frame, and of full turns, those nearest to the frame before are
+    Of the two solutions of a frame, and of whole turns, those nearest to the previous frame are
     chosen. The first and second angle are solved after the third, so that all three restore the
-    matrix to rounding even in gimbal lock, in which the third keeps the value of the frame before.
+    matrix to rounding even in gimbal lock, where the third keeps its previous value.
     """
     i, j, k = ("xyz".index(letter) for letter in order)
     sign = _sign(order)

@@ -160,7 +160,7 @@ def _text(value: object) -> str:
 
 def _name(value: object) -> str:
     text = _text(value)
-    text.encode()  # UnicodeEncodeError, a ValueError, of half a surrogate pair
+    text.encode()  # half a surrogate pair raises UnicodeEncodeError, a ValueError
     return text
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-MOST = 64  # results that are kept, of files that may be closed
+MOST = 64  # kept results; their files may be closed
 Result = TypeVar("Result")
 
 

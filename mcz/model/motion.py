@@ -242,7 +242,7 @@ class Motion:
         )
 
     def with_values(self, values: Floats) -> Motion:
-        """The same motion with other values of its motion signal, same shape."""
+        """A copy with other values of the motion signal, of the same shape."""
         signal = replace(self.signals[0], values=np.asarray(values, dtype=np.float64))
         source = self.source and self.source.without_file()
         return replace(self, signals=(signal, *self.signals[1:]), source=source)
@@ -263,18 +263,18 @@ class Motion:
         return known_timeline(self.name, self.timeline).times
 
     def at_rate(self, rate: Fraction) -> Motion:
-        """The same frames and numbers at another frame rate, which changes the times."""
+        """A copy at another frame rate, which changes the times."""
         first_time = self.first_time
         if first_time is not None and self.frame_rate is not None:
             first_time *= float(self.frame_rate / rate)
         return replace(self, frame_rate=rate, frame_rate_exact=True, first_time=first_time)
 
     def without_source(self) -> Motion:
-        """The same motion without its source, at the same times."""
+        """A copy without the source, at the same times."""
         return replace(self, source=None).at_times(self.timeline)
 
     def with_consecutive_numbers(self) -> Motion:
-        """The same motion at the same times with a ``number_step`` of 1, as files store it.
+        """A copy at the same times with a ``number_step`` of 1, as files store it.
 
         Frame numbers are kept if there is a source, which may print them.
         """
@@ -308,7 +308,7 @@ class Motion:
         return replace(self, signals=(*others, signal))
 
     def with_signals(self, indices: Sequence[int]) -> Motion:
-        """The same motion with only the signals ``indices`` (indices), in the order given.
+        """A copy with only the signals ``indices``, in this order.
 
         Residuals of a signal that is left out lose their role.
         """

@@ -28,7 +28,7 @@ from mcz.model.numbers.grid import grid_blocks
 from mcz.model.skeleton import CHANNELS, Channel
 from mcz.model.types import Bools, Floats, Ints, Values
 
-MAX_INTEGER = 2.0**53  # greatest integer up to which a binary64 holds all exactly
+MAX_INTEGER = 2.0**53  # binary64 holds all integers up to this exactly
 
 
 _FLOATS = array_of("f8", 1, "float64 of one dimension")
@@ -112,7 +112,7 @@ class Exceptions:
         return len(self.texts)
 
     def moved(self, columns: Ints) -> Exceptions:
-        """The same with column ``columns[k]`` for channel k; channels with -1 are left out."""
+        """A copy with column ``columns[k]`` for channel k, without channels with -1."""
         if not len(self):
             return self
         channels = columns[self.channels]
@@ -367,14 +367,14 @@ class Signal:
         )
 
     def in_units(self, scaling: Scaling | None) -> Signal:
-        """The same with ``values`` in units, scaled from the stored numbers."""
+        """A copy with ``values`` in units, scaled from the stored numbers."""
         if scaling is None:
             return self
         values = scaling.values(self.stored)
         return replace(self, values=values, stored=self.stored, scaling=scaling)
 
     def as_stored(self) -> Signal:
-        """The same with the stored numbers as its values, for codecs and formats."""
+        """A copy with the stored numbers as its values, for codecs and formats."""
         if self.scaling is None:
             return self
         stored = self.scaling.stored(self.values, self.stored)

@@ -77,7 +77,7 @@ class Source:
             raise MotionError(f"source: size is {self.size}")
 
     def without_file(self) -> Source:
-        """The same for changed values or frames: without size and hash."""
+        """A copy for changed values or frames: without size and hash."""
         return replace(self, size=0, sha256=b"")
 
     def cut(self, start: int, stop: int) -> Source:
@@ -338,7 +338,7 @@ class Skeleton:
 def first_columns(
     channels: Sequence[Channel], kinds: tuple[str, ...], start: int = 0
 ) -> tuple[int, ...]:
-    """The columns of kinds that turn a joint together, () if one of them is missing.
+    """The columns of ``kinds``, which turn a joint together; () if one is missing.
 
     The first channel of each kind counts; ``start`` is the first column of the joint.
     """

@@ -154,7 +154,7 @@ def nearest_names(name: str, known: Iterable[str]) -> str:
 
 
 def fields_text(instance: Any) -> str:
-    """A dataclass as its fields, of long ones the first items and their number."""
+    """A dataclass as its fields; long ones as their first items and their number."""
     parts = (f"{f.name}={_value(getattr(instance, f.name))}" for f in fields(instance) if f.repr)
     return f"{type(instance).__name__}({', '.join(parts)})"
 

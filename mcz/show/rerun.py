@@ -180,7 +180,7 @@ class _Log:
 
 
 class _Figure:
-    """Nodes of a skeleton, which of them are its points, and the bones of each side."""
+    """Nodes of a skeleton, its points among them, and the bones of each side."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.body = body_of(skeleton)

@@ -65,7 +65,7 @@ def printed_count(layout: FrameLayout, n_rows: int) -> bytes:
 
 
 def text_limit(source: Source, shapes: Sequence[tuple[int, int]]) -> int:
-    """Limit in bytes of the rows of tables of these (rows, channels)."""
+    """Most bytes for the rows of tables of these (rows, channels)."""
     limit = max(TEXT_LIMIT, TEXT_PER_CELL * sum(rows * (columns + 1) for rows, columns in shapes))
     return min(limit, max(TEXT_LIMIT, TEXT_PER_SIZE * source.size)) if source.size else limit
 
@@ -117,7 +117,7 @@ def pattern_runs(layout: FrameLayout, notes: RowNotes | None, n_rows: int) -> li
 
 
 SCRATCH = 2**20  # bytes for rows while they are printed, fewer than a processor's cache has
-NEAR = 64  # rows beside one with an odd cell that are taken with it
+NEAR = 64  # rows near one with an odd cell are printed with it
 
 
 @dataclass(slots=True)
@@ -164,10 +164,10 @@ class PrintedRows:
         return spans
 
     def _odd(self, first: int, last: int) -> memoryview:
-        """Rows with any cells; their size is known before any of them is written."""
+        """Restore rows with cells of any kind; their size is known before the first is written."""
         whole = (first, last) == (0, self.signal.n_rows)
         signal = self.signal if whole else self.signal.cut(first, last)
-        runs = [(p, a - first, b - first) for p, a, b in _clipped(self.runs, first, last)]
+        runs = [(p, a - first, b - first) for p, a, b in _clip_runs(self.runs, first, last)]
         cells = PrintedCells(
             signal, self.numbers[first:last] if prints_frame_numbers(runs) else None
         )
@@ -197,7 +197,7 @@ class PrintedRows:
         n_odd = NEAR
         for start, stop, grids in _grid_runs(self.signal):
             rules = print_rules(grids)
-            for pattern, row, end in _clipped(self.runs, max(first, start), min(last, stop)):
+            for pattern, row, end in _clip_runs(self.runs, max(first, start), min(last, stop)):
                 while row < end:
                     done, text = self._print_rows(pattern, values[row:end], row, rules)
                     row += done
@@ -234,7 +234,7 @@ class PrintedRows:
             raise LimitError(f"source template: a text of {self.size} bytes, limit {self.limit}")
 
 
-def _clipped(runs: Sequence[Run], first: int, last: int) -> Iterator[Run]:
+def _clip_runs(runs: Sequence[Run], first: int, last: int) -> Iterator[Run]:
     """The runs of rows first <= r < last."""
     for pattern, start, stop in runs:
         if max(start, first) < min(stop, last):
@@ -289,7 +289,7 @@ class PrintedCells:
         """Give the ``chosen`` cells (n_rows, n_channels) one text, which may be empty."""
         self.start[:, :-1][chosen] = self._total
         self.size[:, :-1][chosen] = len(text)
-        # The padding loop reads the first byte, of an empty text too.
+        # The padding loop reads the first byte, even of an empty text.
         self._append(np.frombuffer(text + b"\0", np.uint8))
 
     def _append(self, buffer: Bytes) -> None:
@@ -297,7 +297,7 @@ class PrintedCells:
         self._total += len(buffer)
 
     def _print_rows(self, values: Values, rows: slice, grids: Sequence[Grid]) -> None:
-        """Print rows in which each column has one grid; first all columns of decimal grids."""
+        """Print rows in which each column has one grid; columns of decimal grids first."""
         values, size = values[rows], self.size[rows]
         self._append(print_values(values, grids, self._total, self.start[rows], size))
         if size[:, :-1].all():

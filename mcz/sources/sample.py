@@ -1,9 +1,9 @@
 """A walk made from nothing: the clips of ``mcz sample``, the same bytes on every machine.
 
-The skeleton has the 31 joints and the bone names that Acclaim files commonly have, with
-proportions of its own. The legs follow rounded textbook curves of level walking, given at each
-tenth of the gait cycle; all else are sines. Every value is rounded to the digits that are printed,
-so the last bits of a machine's sine do not reach the file. Markers sit on the same skeleton.
+The skeleton has the 31 joints and the bone names that Acclaim files commonly have, with proportions
+of its own. The legs follow rounded textbook curves of level walking, at each tenth of the gait
+cycle; the rest are sines. Values are rounded to the printed digits, so that the last bits of a
+machine's sine have no effect. Markers sit on the same skeleton.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def acclaim_walk() -> Motion:
 
 
 def bvh_walk() -> Motion:
-    """The same walk in BVH: 31 joints and 7 end sites in cm, 96 channels, 4 decimals."""
+    """The walk in BVH: 31 joints and 7 end sites in cm, 96 channels, 4 decimals."""
     walk = acclaim_walk()
     tracks = iter(walk.values.T)
     leaves = {j.name for j in walk.skeleton.joints} - {
@@ -183,9 +183,9 @@ def bvh_walk() -> Motion:
 
 
 def marker_walk() -> Motion:
-    """The same walk as 34 markers in mm, to 0.01 mm; x ahead, y to the left, z up, with gaps."""
+    """The walk as 34 markers in mm, to 0.01 mm; x ahead, y to the left, z up, with gaps."""
     walk = acclaim_walk()
-    placed = _placed(walk)
+    placed = _place_joints(walk)
     labels, columns = [], []
     for label, joint, (x, y, z) in _markers():
         origin, turn = placed[joint]
@@ -217,7 +217,7 @@ def _markers() -> Iterator[tuple[str, str, Vector]]:
     yield from MIDDLE_MARKERS
 
 
-def _placed(walk: Motion) -> dict[str, tuple[Floats, Floats]]:
+def _place_joints(walk: Motion) -> dict[str, tuple[Floats, Floats]]:
     """Origin (n_frames, 3) and turn (n_frames, 3, 3) of every joint in the world."""
     tracks = iter(walk.values.T)
     joints = walk.skeleton.joints
@@ -338,14 +338,14 @@ def _wobble(n_channels: int) -> Floats:
 
 def _local_rotation(joint: Joint, angles: dict[str, Floats]) -> Floats:
     """Rotation of an Acclaim joint along the axes of its parent, (n_frames, 3, 3)."""
-    frame = _fixed(*(np.full(1, np.deg2rad(angle)) for angle in joint.axis))[0]
+    frame = _rotate_fixed(*(np.full(1, np.deg2rad(angle)) for angle in joint.axis))[0]
     zero = np.zeros(N_FRAMES)
-    turn = _fixed(*(np.deg2rad(angles.get(kind, zero)) for kind in ("rx", "ry", "rz")))
+    turn = _rotate_fixed(*(np.deg2rad(angles.get(kind, zero)) for kind in ("rx", "ry", "rz")))
     local: Floats = frame @ turn @ frame.T
     return local
 
 
-def _fixed(x: Floats, y: Floats, z: Floats) -> Floats:
+def _rotate_fixed(x: Floats, y: Floats, z: Floats) -> Floats:
     """Rotation about the fixed axes x, then y, then z, angles in radians, (n, 3, 3)."""
     turn: Floats = _about("z", z) @ _about("y", y) @ _about("x", x)
     return turn

@@ -1,7 +1,7 @@
-"""Frame rates that templates of sources state, and templates that state another one.
+"""Frame rates in templates of sources, and templates with another rate.
 
-A clip may have another rate than its source states: one that was corrected. The file as it was is
-restored as it was; whatever else is written in its style states the rate of the clip.
+A clip may have another rate than its source states, once corrected. The original file is restored
+unchanged; other files in its style state the rate of the clip.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from mcz.sources.tables.layout import (
     ClockFields,
     SectionFields,
     TableTemplate,
-    parsed_clock,
-    with_phrases,
+    mark_phrases,
+    parse_clock,
 )
 from mcz.sources.tables.times import DECIMAL, frame_rate, frame_time, stated_rate
 from mcz.sources.text.layout import MAX_RUNS, Template
@@ -90,7 +90,7 @@ def restate_outputs(template: bytes, rate: Fraction) -> Restated | None:
 
 
 def _restated_head(shared: C3dTemplate, rate: Fraction) -> Restated | None:
-    """The head of a C3D at another rate, as it is if that cannot be stated."""
+    """The header of a C3D at another rate; unchanged if it cannot state that rate."""
     head = bytearray(shared.head)
     try:
         order, start = find_parameters(bytes(head))
@@ -121,16 +121,16 @@ def restate_table(template: bytes, rate: Fraction) -> Restated | None:
     first = next((section for section in fields.sections if 0 in section.signals), None)
     if first is None:
         return None
-    clock = parsed_clock(first)
-    stated = _header_rate(first) if clock is None else clock.frames_a_second(rate)
+    clock = parse_clock(first)
+    stated = _header_rate(first) if clock is None else clock.numbers_per_second(rate)
     if stated is None:
         return None
     factor = rate / stated
     sections = []
     for section in fields.sections:
         header = _in_header(_text(section), factor)
-        header = with_phrases(header) if section.marks else header
-        own = parsed_clock(section)
+        header = mark_phrases(header) if section.marks else header
+        own = parse_clock(section)
         scaled = None if own is None else _scale_clock(own, factor)
         if own is not None and scaled is None:
             return Restated(stated, template)
@@ -198,7 +198,7 @@ def _decimal_like(old: bytes, number: Fraction, means_it: Callable[[str], bool])
 
 
 def _is_time_of(text: str, rate: Fraction) -> bool:
-    """Return whether a frame time stands for ``rate``, also to those who take its reciprocal."""
+    """Return True if a frame time means ``rate``, also if a reader takes its reciprocal."""
     return frame_rate(text)[0] == rate and abs(Fraction(text) * rate - 1) <= NEAR
 
 

@@ -512,7 +512,7 @@ def test_commands_say_what_is_read_and_what_is_kept(
     points = np.asfortranarray(floats(9, 4, 3))
     deflated = Member("old.npy", zlib.compress(b"anything")[2:-4], method=8, size=8)
     members = [
-        Member("points.npy", npy(points, by_columns=True)),
+        Member("points.npy", npy(points, is_fortran=True)),
         Member("betas.npy", npy(floats(10))),
         Member("steps.npy", npy(np.arange(9).astype(">i4"))),
     ]

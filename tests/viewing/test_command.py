@@ -20,7 +20,7 @@ import pytest
 import mcz
 from mcz import AccessError, OptionError
 from mcz.show.viewing import view
-from mcz.show.viewing.server_tasks import Visitors
+from mcz.show.viewing.server_tasks import OpenPages
 from tests.commands import Call
 
 
@@ -117,7 +117,7 @@ def test_without_a_browser_the_address_is_said(
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setattr(Visitors, "wait", lambda self, for_ever: None)
+    monkeypatch.setattr(OpenPages, "wait", lambda self, for_ever: None)
     code, out, errors = call("view", samples / "walk.bvh", "--json")
     document = json.loads(out)
     assert code == 0
@@ -131,19 +131,19 @@ def test_without_a_browser_the_address_is_said(
 
 
 def test_visitors_may_come_back() -> None:
-    visitors = Visitors(30.0)
-    waiting = Thread(target=visitors.wait)
+    pages = OpenPages(30.0)
+    waiting = Thread(target=pages.wait)
     waiting.start()
-    with visitors:
+    with pages:
         pass
-    with visitors:  # within the time of grace
+    with pages:  # within the time of grace
         waiting.join(0.05)
         assert waiting.is_alive()
-    assert visitors.stay(0.0)
-    visitors.close()
+    assert pages.stay(0.0)
+    pages.close()
     waiting.join(10)
     assert not waiting.is_alive()
-    assert not visitors.stay(30.0)
+    assert not pages.stay(30.0)
 
 
 @pytest.mark.parametrize(

@@ -633,7 +633,7 @@ def test_a_form_in_pieces_is_the_same(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_too_much_is_refused(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(type(server.site.work), "most_posted", 100)
+    monkeypatch.setattr(type(server.site.tasks), "most_posted", 100)
     assert convert(server, form(("a.bvh", b"x" * 200))).status == 413
     assert ask(server, "convert", "POST", b"x", Content_Type="text/plain").status == 415
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz.bench.cases import Case, Loaded, Variant, load
+from mcz.bench.cases import Case, LoadedCase, Variant, load
 from mcz.bench.measure import (
     LEAST_SECONDS,
     MOST_RUNS,
@@ -72,7 +72,7 @@ def bases(clips: Clips, recipe: Sequence[tuple[str, Any]]) -> Record:
     return {"data": base64.b64encode(trained.data).decode(), "document": document}
 
 
-def point_of(loaded: Loaded, variant: Variant, params: Mapping[str, Any]) -> Record:
+def point_of(loaded: LoadedCase, variant: Variant, params: Mapping[str, Any]) -> Record:
     """Bytes and mean distance in cm at one setting, by the public reader.
 
     Raises MotionError where the length unit is unknown.
@@ -117,7 +117,7 @@ def curve(case: Case, variant: Variant, data: str = "") -> list[Record]:
         return walk(measure, settings.snap(_start(loaded, variant)), settings.snap)
 
 
-def _start(loaded: Loaded, variant: Variant) -> float:
+def _start(loaded: LoadedCase, variant: Variant) -> float:
     codec = codec_by_name(variant.codec)
     in_places = codec.positions and variant.options().get("domain") != "channels"
     return START_CM / (loaded.motion.skeleton.unit_cm or 1.0) if in_places else 1.0

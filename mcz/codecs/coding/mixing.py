@@ -1,12 +1,12 @@
-"""Compiled: a binary range coder, and bits coded with the mixed opinion of three contexts.
+"""Compiled: a binary range coder, and logistic mixing of the predictions of three contexts.
 
 One function serves encoder and decoder, so that the two cannot drift apart: an encoder codes the
 bit that it is given and returns it; a decoder returns the bit that it finds. SPEC.md, "Entropy
 coding", is normative. The tables of the logistic mixer are made from 33 stored numbers by integer
 arithmetic alone, so that every machine has the same.
 
-All that a coder knows is one array of int64, ``state``: compiling and calling with one array is
-several times quicker than with five.
+The whole state of a coder is one array of int64: compiling and calling with one array is several
+times faster than with five.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _put(state: Ints, data: Bytes, byte: int) -> None:
         data[at] = byte
 
 
-def code(state: Ints, data: Bytes, bit: int, one: int) -> int:
+def code_bit(state: Ints, data: Bytes, bit: int, one: int) -> int:
     """Code a bit that is 1 with probability ``one`` / 65536, 0 < one < 65536."""
     low, high = state[LOW], state[HIGH]
     width = high - low
@@ -138,23 +138,23 @@ def coded_size(state: Ints) -> int:
     return int(state[POSITION] - 4 + last_bytes(state))
 
 
-def number(state: Ints, data: Bytes, value: int, n_bits: int) -> int:
+def code_bits(state: Ints, data: Bytes, value: int, n_bits: int) -> int:
     """Code the low ``n_bits`` of ``value``, the highest first, each bit as likely 0 as 1."""
     out = 0
     for shift in range(n_bits - 1, -1, -1):
-        out = out << 1 | code(state, data, value >> shift & 1, 32768)  # RANGE-03
+        out = out << 1 | code_bit(state, data, value >> shift & 1, 32768)  # RANGE-03
     return out
 
 
-def mixed(state: Ints, data: Bytes, bit: int, mixer: int, a: int, b: int, c: int) -> int:
-    """Code a bit by the opinions of contexts ``a``, ``b`` and ``c``, then let them learn."""
+def code_mixed(state: Ints, data: Bytes, bit: int, mixer: int, a: int, b: int, c: int) -> int:
+    """Code a bit with the mixed predictions of three contexts, then update them."""
     a, b, c, w = MODELS + 2 * a, MODELS + 2 * b, MODELS + 2 * c, WEIGHTS + 3 * mixer
     x = state[STRETCH + (state[a] >> 4)]
     y = state[STRETCH + (state[b] >> 4)]
     z = state[STRETCH + (state[c] >> 4)]
     dot = (state[w] * x + state[w + 1] * y + state[w + 2] * z) >> 16
     one = state[SQUASH + 2048 + min(max(dot, -LIMIT), LIMIT)]
-    bit = code(state, data, bit, one)
+    bit = code_bit(state, data, bit, one)
     error = (bit << 16) - one
     _weigh(state, w, x * error)
     _weigh(state, w + 1, y * error)
@@ -166,10 +166,10 @@ def mixed(state: Ints, data: Bytes, bit: int, mixer: int, a: int, b: int, c: int
     return bit
 
 
-def adaptive(state: Ints, data: Bytes, bit: int, context: int) -> int:
-    """Code a bit by the opinion of one context, then let it learn."""
+def code_adaptive(state: Ints, data: Bytes, bit: int, context: int) -> int:
+    """Code a bit with the prediction of one context, then update it."""
     at = MODELS + 2 * context
-    bit = code(state, data, bit, min(max(state[at], LEAST_ONE), 65536 - LEAST_ONE))
+    bit = code_bit(state, data, bit, min(max(state[at], LEAST_ONE), 65536 - LEAST_ONE))
     _learn(state, at, 65535 if bit else 0)
     return bit
 

@@ -1,13 +1,13 @@
-"""Compiled: integers whose sizes are roughly known, coded bit length first, and tables of them.
+"""Compiled: integers of roughly known size, coded by their bit length, and tables of them.
 
 One function serves encoder and decoder. SPEC.md, "Residuals" and "Bases", are normative; a codec
-says what the scales and the neighbors of an integer are, and has its own contexts. Imported on
-first use only.
+defines the scales and neighbors of an integer, and has contexts of its own. Imported on first use
+only.
 """
 
 from __future__ import annotations
 
-from mcz.codecs.coding.mixing import mixed, number
+from mcz.codecs.coding.mixing import code_bits, code_mixed
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Ints, Ints2
 
@@ -45,14 +45,14 @@ def side_of(value: int) -> int:
 
 
 def code_first(state: Ints, data: Bytes, value: int) -> int:
-    """Code a number of which nothing is known: its length, its bits, its sign."""
-    length = number(state, data, bits(abs(value)), LENGTH_BITS)
+    """Code a number of unknown size: its length, its bits, its sign."""
+    length = code_bits(state, data, bits(abs(value)), LENGTH_BITS)
     if length > 41:  # QBC-19
         return FAULT
     if length == 0:
         return 0
-    size = 1 << (length - 1) | number(state, data, abs(value), length - 1)  # QBC-17
-    return -size if number(state, data, 1 if value < 0 else 0, 1) else size  # QBC-17
+    size = 1 << (length - 1) | code_bits(state, data, abs(value), length - 1)  # QBC-17
+    return -size if code_bits(state, data, 1 if value < 0 else 0, 1) else size  # QBC-17
 
 
 def code_residual(
@@ -66,8 +66,8 @@ def code_residual(
 ) -> int:
     """Code an integer of about the size of ``scales``, in sixteenths; FAULT if it is too long.
 
-    ``near`` (0 to 7) and ``sides`` (0 none, 1 above, 2 below; the third also 3) are what its
-    neighbors say; ``first`` are the first context and mixer of the codec's residuals.
+    ``near`` (0 to 7) and ``sides`` (0 none, 1 above, 2 below; the third also 3) depend on its
+    neighbors; ``first`` are the first context and mixer of the codec's residuals.
     """
     kf, ks = quarters(scales[0] + 1), quarters(scales[1] + 1)
     size = abs(residual)
@@ -80,14 +80,14 @@ def code_residual(
     at = first[0] + C_SIDE
     b = at + 3 + 3 * sides[0] + sides[1]
     side = 1 if residual < 0 else 0
-    side = mixed(state, data, side, first[1] + M_SIDE, at + sides[0], b, at + 12 + sides[2])
+    side = code_mixed(state, data, side, first[1] + M_SIDE, at + sides[0], b, at + 12 + sides[2])
     return -coded_size if side == 1 else coded_size
 
 
 def code_length(
     state: Ints, data: Bytes, length: int, kf: int, ks: int, near: int, first: tuple[int, int]
 ) -> int:
-    """Code the bit length of a residual, first against a length that it will hardly miss."""
+    """Code the bit length of a residual: first if it is below a usual least length."""
     contexts, mixers = first
     cf, cs = kf if kf < 28 else 28 + (kf & 3), ks if ks < 28 else 28 + (ks & 3)
     bf, bs = octave(kf), octave(ks)
@@ -95,14 +95,14 @@ def code_length(
     if base > 0:
         below = 1 if length < base else 0
         a, b = contexts + C_BELOW + cf, contexts + C_BELOW + 32 + cs
-        if mixed(state, data, below, mixers + M_BELOW, a, b, contexts + C_BELOW + 64 + near):
+        if code_mixed(state, data, below, mixers + M_BELOW, a, b, contexts + C_BELOW + 64 + near):
             at = base - 1
             while at > 0:
                 less = 1 if length < at else 0
                 # RESID-01
                 a, b = contexts + C_LESS + min(base - at, 15), contexts + C_LESS + 16 + cf
                 c = contexts + C_LESS + 48 + cs
-                if not mixed(state, data, less, mixers + M_LESS, a, b, c):
+                if not code_mixed(state, data, less, mixers + M_LESS, a, b, c):
                     break
                 at -= 1
             return at
@@ -112,7 +112,7 @@ def code_length(
         a, b = contexts + C_MORE + 24 * cf + f, contexts + C_MORE + 768 + 24 * cs + s
         c = contexts + C_MORE + 1536 + 2 * (24 * near + f) + (1 if bf > bs else 0)  # RESID-01
         more = 1 if length > at else 0
-        if not mixed(state, data, more, mixers + M_MORE + min(f, 11), a, b, c):
+        if not code_mixed(state, data, more, mixers + M_MORE + min(f, 11), a, b, c):
             return at
         at += 1
     return -1
@@ -125,7 +125,7 @@ def octave(quarters_of: int) -> int:
 def code_size(
     state: Ints, data: Bytes, size: int, length: int, kf: int, ks: int, first: tuple[int, int]
 ) -> int:
-    """Code the bits of an absolute value after its first; ``length`` >= 1 is how many it has."""
+    """Code all but the first of the ``length`` >= 1 bits of an absolute value."""
     contexts, mixers = first
     f, s = clamp(length - octave(kf) + 4, 0, 15), clamp(length - octave(ks) + 4, 0, 15)
     e, qf, qs = min(length, 31), kf & 3, ks & 3
@@ -134,14 +134,14 @@ def code_size(
         at = contexts + C_SECOND
         a, b = at + 4 * f + qf, at + 64 + 4 * s + qs  # RESID-01
         bit = size >> (length - 2) & 1
-        code = 2 + mixed(state, data, bit, mixers + M_SECOND, a, b, at + 128 + e)
+        code = 2 + code_mixed(state, data, bit, mixers + M_SECOND, a, b, at + 128 + e)
     if length > 2:
         at = contexts + C_THIRD + (code & 1)
         a, b = at + 8 * f + 2 * qf, at + 128 + 8 * s + 2 * qs  # RESID-01
         bit = size >> (length - 3) & 1
-        code = 2 * code + mixed(state, data, bit, mixers + M_THIRD, a, b, at + 256 + 2 * e)
+        code = 2 * code + code_mixed(state, data, bit, mixers + M_THIRD, a, b, at + 256 + 2 * e)
     if length > 3:
-        code = code << (length - 3) | number(state, data, size, length - 3)
+        code = code << (length - 3) | code_bits(state, data, size, length - 3)
     return code
 
 
@@ -152,7 +152,7 @@ BASIS = N_CONTEXTS, N_MIXERS
 
 @kernel
 def code_table(state: Ints, data: Bytes, table: Ints2, scales: Ints, is_basis: int) -> int:
-    """Code a table (rows, channels) in place, each row from its scale on; 1 if impossible."""
+    """Code a table (rows, channels) in place, rows from ``scales`` on; 1 for a fault."""
     for row in range(len(table)):
         fast = slow = scales[row] << 4
         near = side_1 = side_2 = 0

@@ -22,7 +22,7 @@ from mcz.model.types import Bools, Floats, Ints, Params, Settings
 MAX_INDEX = 2**40
 LEAST_STEP = 2.0**-100
 LEAST_LEVER = 2.0**-30
-STEP_SHARE = 0.75  # a step, of the allowed distance, if no decimals are given
+STEP_SHARE = 0.75  # step as a share of the allowed distance, if no decimals are given
 FEWEST_MOST = 512  # greatest distance of marks for the search for the fewest breaks
 
 PRESETS: dict[str, Settings] = {

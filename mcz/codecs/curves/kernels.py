@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.codecs.coding import residuals
-from mcz.codecs.coding.mixing import mixed
+from mcz.codecs.coding.mixing import code_mixed
 from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Flags, FloatColumns, Floats, Floats2, Ints, Ints2
@@ -25,7 +25,7 @@ MIDDLES = 2 * residuals.N_CONTEXTS, 2 * residuals.N_MIXERS
 C_LAST, M_LAST = 3 * residuals.N_CONTEXTS, 3 * residuals.N_MIXERS
 N_DETAIL_MIXERS = M_LAST + 1
 
-FAST, SLOW, SIDE_1, SIDE_2, TRACK_SIZE = range(5)  # what is remembered of a channel
+FAST, SLOW, SIDE_1, SIDE_2, TRACK_SIZE = range(5)  # state of a channel
 
 
 def code_point(
@@ -140,12 +140,12 @@ def code_details(
 
 
 def code_length(state: Ints, data: Bytes, length: int, left: int, n_here: int, usual: int) -> int:
-    """Code the frames of a curve, of which ``left`` are left up to the next mark; 0 for a fault."""
+    """Code the length of a curve, at most ``left`` frames up to the next mark; 0 for a fault."""
     if left == 1:
         return 1
     a = C_LAST + min(bits(left), 15)
     b, c = C_LAST + 16 + min(n_here, 7), C_LAST + 24 + clamp(usual - n_here, 0, 7)
-    if mixed(state, data, 1 if length == left else 0, M_LAST, a, b, c):
+    if code_mixed(state, data, 1 if length == left else 0, M_LAST, a, b, c):
         return left
     half = left >> 1
     error = code_residual(  # QBC-23
@@ -192,7 +192,7 @@ class Rule(NamedTuple):
     """Rule by which curves are fitted.
 
     ``closed``: ends and middle are rounded before the error is measured, so that the bound holds
-    for what is decoded; to multiples of 1 / ``per``, or of ``step`` if that is 0.
+    for decoded values. They are multiples of 1 / ``per``, or of ``step`` if ``per`` is 0.
     """
 
     method: int
@@ -243,9 +243,9 @@ def middle(points: Floats2, a: int, b: int, ends: Floats2, method: int, out: Flo
 def worst(
     points: Floats2, a: int, b: int, ends: Floats2, mid: Floats, enough: float
 ) -> tuple[float, int]:
-    """The greatest squared distance from the curve, and the first frame that has it.
+    """The greatest squared distance from the curve, and its first frame.
 
-    It is looked for until it exceeds ``enough``.
+    The search stops at the first distance above ``enough``.
     """
     n_channels = points.shape[1]
     length = b - a
@@ -269,7 +269,7 @@ def fit(
 ) -> tuple[float, int]:
     """Fit one curve; ``work`` (3, channels) then has its two ends and its middle.
 
-    ``exact`` are the ends that are used, the points or the rounded points.
+    Ends come from ``exact``: the points, perhaps rounded.
     """
     for c in range(points.shape[1]):
         work[0, c], work[1, c] = exact[a, c], exact[b, c]
@@ -284,7 +284,7 @@ def fit(
 def breaks_by_splitting(
     points: Floats2, exact: Floats2, marks: Ints, limit: float, rule: Rule, is_break: Flags
 ) -> None:
-    """Set ``is_break`` at the frames at which curves meet between marks: split at the worst one."""
+    """Set ``is_break`` where curves meet between marks: split each at its worst frame."""
     work = np.zeros((3, points.shape[1]))
     stack = np.zeros((len(points) + 2, 2), np.int64)
     for k in range(len(marks) - 1):
@@ -308,7 +308,7 @@ def breaks_by_splitting(
 def breaks_of_fewest(
     points: Floats2, exact: Floats2, marks: Ints, limit: float, rule: Rule, is_break: Flags
 ) -> None:
-    """Set ``is_break`` at the fewest frames that keep the bound; of equals, the best fit.
+    """Set ``is_break`` at the fewest frames that keep the bound; the best fit of equal numbers.
 
     Dynamic programming between two marks: the work grows with the cube of their distance.
     """

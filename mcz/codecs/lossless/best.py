@@ -3,7 +3,7 @@
 SPEC.md, "Codec 2: best", is normative; the names below are its field names.
 
 Exactness: lossless and bit-exact. Predictions are binary64 in one stated order, of ``+ - * /`` and
-rounding down alone; all else is in integers. A signal is one group, so that each channel can be
+rounding down alone; all else is integers. A signal is one group, so that each channel can be
 predicted from those before it.
 """
 
@@ -73,7 +73,7 @@ def _prepare(source: SignalSource, start: int, stop: int) -> Callable[[], tuple[
 
 
 def recode(request: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
-    """The streams of all segments with new values."""
+    """Yield the streams of each segment with new values."""
     for span in request.spans:
         yield _prepare(request.source, span.first, span.stop)()
 
@@ -115,7 +115,7 @@ Words = NDArray[np.int32]
 Bytes = NDArray[np.uint8]
 
 AS_FAST, PREDICTED, ECHOED = range(3)  # method
-WORK, SPARE = 64, 1024  # references x rows that a byte is worth; spare bytes
+WORK_OF_BYTE, SPARE = 64, 1024  # references x rows a byte of stream may cost, after SPARE bytes
 
 
 def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> bytes:
@@ -129,7 +129,7 @@ def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> byt
         echoes = _echoes_of(plan, leads)
         for repeated in ([], echoes) if echoes else ([],):
             stream = code_plan(plan, chosen, repeated)
-            if _work(chosen, len(leads)) <= WORK * (len(stream) + SPARE):
+            if _work(chosen, len(leads)) <= WORK_OF_BYTE * (len(stream) + SPARE):
                 streams.append(stream)
     # Last, because it adds parents to the heads.
     streams.append(bytes((AS_FAST,)) + builder.write(plan)[0])
@@ -150,7 +150,7 @@ def _work(references: Sequence[Sequence[int]], n_rows: int) -> int:
 
 
 def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[Echo]) -> bytes:
-    """The stream of method 1, or of method 2 with echoes, of at least one lane."""
+    """Build the stream of method 1, or 2 if there are echoes, for one or more lanes."""
     coded, columns = plan.lanes, plan.channels.columns
     n_lanes, n_rows = coded.leads.shape
     table = echo_table(echoes, n_rows, n_lanes)
@@ -168,31 +168,32 @@ def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[
     has_rests = rests.scales >= 0
     rests.values[:, has_rests] = columns[coded.numbers[has_rests]].T
     model = _Model(lanes, table, leads, rests)
-    for row, ones in zip(model.references, references, strict=True):
-        row[: 1 + len(ones)] = len(ones), *ones
+    for row, chosen in zip(model.references, references, strict=True):
+        row[: 1 + len(chosen)] = len(chosen), *chosen
     bits = encode_stream(
         start_states("best")[0], 4 * leads.size + 1024, model.run, "best: a segment"
     )
     residuals = (build_echoes(echoes) if echoes else b"") + bits
-    room = np.empty(plan.most_bytes, np.uint8)
-    heads = room[: write_kernels.write_heads(plan.channels, 0, plan.fields, room)].tobytes()
-    tails = room[: best_kernels.write_tails(coded, columns, table, room)].tobytes()
+    buffer = np.empty(plan.most_bytes, np.uint8)
+    n_bytes = write_kernels.write_heads(plan.channels, 0, plan.fields, buffer)
+    heads = buffer[:n_bytes].tobytes()
+    tails = buffer[: best_kernels.write_tails(coded, columns, table, buffer)].tobytes()
     method = bytes((ECHOED if echoes else PREDICTED,))
     return b"".join((method, heads, varint(len(residuals)), residuals, tails))
 
 
 class _Model:
-    """The loops that a coder runs over a segment."""
+    """The state of a segment, and the loops that code it."""
 
     def __init__(self, lanes: Predictors, echoes: Ints, leads: Words, rests: Rests) -> None:
         self.lanes, self.echoes, self.leads, self.rests = lanes, echoes, leads, rests
         n_lanes, most = leads.shape[1], best_kernels.MOST_REFERENCES
-        # their number, then the references
+        # for each lane the number of its references, then these
         self.references = np.zeros((n_lanes, 1 + most), np.int64)
         self.most_work: int | None = None  # of references x rows, for a decoder
 
     def run(self, state: Ints, data: Bytes) -> bool:
-        """Code references, leads and rests in place; False if one of them has no code."""
+        """Code references, leads and rests in place; return False if one has no code."""
         total = best_kernels.code_references(state, data, self.references)
         if total < 0:
             return False
@@ -238,7 +239,7 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     table = echo_table(echoes, len(out), n_lanes)
     lanes.leads[:] = 0
     model = _Model(lanes.predictors, table, lanes.leads, rests)
-    model.most_work = WORK * (len(stream) + SPARE)
+    model.most_work = WORK_OF_BYTE * (len(stream) + SPARE)
     start = start_states("best")[0]  # BEST-06
     decode_stream(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
     tails = residual_kernels.Tails(
@@ -255,6 +256,6 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
 
 
 def _exact_echoes(table: Ints, decoder: SegmentDecoder) -> Ints:
-    """The places of ``table`` whose ordinals echoes determine: in units an ordinal is its lead."""
+    """``table`` without channels in units, whose ordinals are their leads and need no echo."""
     forms = decoder.heads.plans[decoder.lanes.columns, decode_kernels.FORM]
     return np.where(np.isin(forms, WITH_UNIT), 0, table)

@@ -27,13 +27,13 @@ from mcz.codecs.coding.fast.residual_kernels import (
 )
 from mcz.codecs.coding.fast.survey_kernels import CodedLanes
 from mcz.codecs.coding.fast.write_kernels import put_tail
-from mcz.codecs.coding.mixing import number
+from mcz.codecs.coding.mixing import code_bits
 from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.kernels import kernel, wrapped
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2, Words2
 
 LIMIT = 1048576.0  # 2^20: estimates beyond it are none, targets are cut
-SPIKES, LEAST = 0.3, 1e-9  # the part of an error in its row's weight; of a variance
+SPIKES, LEAST = 0.3, 1e-9  # share of an error in its row's weight; least variance
 EARLY_ROWS, EARLY, LATE = 20, 0.2, 0.05  # the speed at which the typical error follows
 SLACK, FLOOR, AWAY = 1e-10, 1e-6, 1e300  # of pivots
 
@@ -160,7 +160,7 @@ N_KINDS = 3
 KEEP = 0.95, 0.998, 0.98
 RIDGE = 0.01, 0.001, 0.01
 LINEAR_LAGS, LINEAR_REFERENCES, QUADRATIC_LAGS, N_BLENDED = 4, 6, 3, 3
-FIRST_ROWS = 8  # in which the blend is not asked
+FIRST_ROWS = 8  # that do not use the blend
 UNIT_BITS = 2  # a unit is about four times the first scale
 REACH = 64.0  # units that a level is counted in
 
@@ -193,14 +193,14 @@ def code_references(state: Ints, data: Bytes, references: Ints2) -> int:
     total = 0
     for channel in range(1, len(references)):
         own = references[channel]
-        own[0] = number(state, data, own[0], COUNT_BITS)  # BEST-08
+        own[0] = code_bits(state, data, own[0], COUNT_BITS)  # BEST-08
         if own[0] > MOST_REFERENCES:  # BEST-09
             return -1
         total += own[0]
         if total > MOST_IN_ALL:  # BEST-11
             return -1
         for place in range(1, own[0] + 1):
-            own[place] = number(state, data, own[place], bits(channel - 1))
+            own[place] = code_bits(state, data, own[place], bits(channel - 1))
             if own[place] >= channel:  # BEST-10
                 return -1
     return total
@@ -267,7 +267,7 @@ def code_rest(state: Ints, data: Bytes, rest: int, memory: Ints, flow: Ints) -> 
 
 
 def echo_of(leads: Words2, place: int) -> int:
-    """The lead at ``place``, counted through from 1; of the other sign if that is below 0."""
+    """The lead at place |``place``|, counted from 1 over all rows; negated if ``place`` < 0."""
     at = abs(place) - 1
     n_channels = leads.shape[1]
     lead = int(leads[BEHIND + at // n_channels, at % n_channels])

@@ -74,7 +74,7 @@ def decode(
 ) -> Ints:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes.
 
-    Rows behind the requested ones are not decoded, except by numpy.
+    Rows after the requested ones are not decoded, except by numpy.
     """
     refuse_extras("fast", header, layout)
     per_frame = layout.samples_per_frame

@@ -141,7 +141,7 @@ class Coder:
             )
 
     def encode(self, kind: int, frames: Floats, n_group: int, threshold: float, plan: Any) -> Unit:
-        """A unit of frames, (frames, n_channels), of a group of ``n_group``; raises MotionError.
+        """Encode frames (frames, n_channels) as a unit of a group of ``n_group``; MotionError.
 
         A refused frame does not affect the next.
         """

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.codecs.coding import mixing, residuals
-from mcz.codecs.coding.mixing import adaptive, number
+from mcz.codecs.coding.mixing import code_adaptive, code_bits
 from mcz.codecs.coding.residuals import bits
 from mcz.codecs.online.rate_kernels import MOD as FIXED
 from mcz.codecs.online.rate_kernels import (
@@ -44,7 +44,7 @@ __all__ = ["N_MEMORY", "TRACK_SIZE", "Choice", "Past", "decode_frames", "encode_
 N_STEPS = 512
 FIRST_STEP = 256  # the code of 1
 
-# Contexts behind the residuals', or in front of all else.
+# Contexts after those of residuals, or before all others.
 C_PRESENT, C_SAME, C_LONGER, N_FLAGS = 0, 4, 6, 15
 MIXED_FLAGS = 3 * residuals.N_CONTEXTS
 GOLOMB_FLAGS = 0
@@ -90,21 +90,23 @@ def _ratio(code: int) -> float:
 
 
 def _code_step(state: Ints, data: Bytes, step: int, kind: int, memory: Ints, flags: int) -> int:
-    """Code the step of a frame against the one before; N_STEPS if it is none."""
+    """Code the step of a frame relative to the previous one; N_STEPS if it is invalid."""
     if kind == INTRA:
-        return number(state, data, step, 9)
+        return code_bits(state, data, step, 9)
     before = memory[LTR_STEP] if kind == LTR else memory[LAST_STEP]  # ONLINE-16
     change = step - before
     # ONLINE-16
-    if adaptive(state, data, 1 if change == 0 else 0, flags + C_SAME + (1 if kind else 0)):
+    if code_adaptive(state, data, 1 if change == 0 else 0, flags + C_SAME + (1 if kind else 0)):
         return int(before)
-    negative = number(state, data, 1 if change < 0 else 0, 1)
+    negative = code_bits(state, data, 1 if change < 0 else 0, 1)
     size, length = abs(change), 1
-    while adaptive(state, data, 1 if bits(size) > length else 0, flags + C_LONGER + length - 1):
+    while code_adaptive(
+        state, data, 1 if bits(size) > length else 0, flags + C_LONGER + length - 1
+    ):
         length += 1
         if length > 9:
             return N_STEPS  # ONLINE-17
-    size = 1 << (length - 1) | number(state, data, size, length - 1)
+    size = 1 << (length - 1) | code_bits(state, data, size, length - 1)
     coded = before - size if negative else before + size
     return int(coded) if 0 <= coded < N_STEPS else N_STEPS  # ONLINE-17, ONLINE-18
 
@@ -126,7 +128,7 @@ def _code_golomb(
             two, one = one, size
     for r in range(len(indices)):
         size = abs(indices[r])
-        if size and number(state, data, 1 if indices[r] < 0 else 0, 1):  # ONLINE-20
+        if size and code_bits(state, data, 1 if indices[r] < 0 else 0, 1):  # ONLINE-20
             indices[r] = -size
         sizes[r] = 0 if kind else size  # ONLINE-20
     return 0
@@ -138,17 +140,19 @@ def _code_size(state: Ints, data: Bytes, size: int, activity: int, kind: int) ->
     klass = activity if rice == 0 else 7 + min(rice, 8)
     context = C_PREFIX + (CLASSES * (1 if kind else 0) + klass) * PREFIX_BITS
     prefix, ones = size >> rice, 0
-    while adaptive(state, data, 1 if prefix > ones else 0, context + min(ones, PREFIX_BITS - 1)):
+    while code_adaptive(
+        state, data, 1 if prefix > ones else 0, context + min(ones, PREFIX_BITS - 1)
+    ):
         ones += 1
         if ones == MOST_ONES:
-            length = number(state, data, bits(prefix - ones + 1), 6)
+            length = code_bits(state, data, bits(prefix - ones + 1), 6)
             if length == 0 or length > 42:  # ONLINE-21
                 return MAX_INDEX + 1
-            ones += (1 << (length - 1) | number(state, data, prefix - ones + 1, length - 1)) - 1
+            ones += (1 << (length - 1) | code_bits(state, data, prefix - ones + 1, length - 1)) - 1
             break
     if ones > MAX_INDEX >> rice:  # ONLINE-21, ONLINE-22
         return MAX_INDEX + 1
-    return ones << rice | number(state, data, size, rice)
+    return ones << rice | code_bits(state, data, size, rice)
 
 
 def _code_frame(
@@ -171,7 +175,7 @@ def _code_frame(
     for index in indices:
         present |= 1 if index != 0 else 0
     context = kind + 1 if kind else memory[PRESENT]  # ONLINE-16
-    present = adaptive(state, data, present, flags + C_PRESENT + context)
+    present = code_adaptive(state, data, present, flags + C_PRESENT + context)
     memory[PRESENT] = 0 if kind else present  # ONLINE-16
     if present:
         step = _code_step(state, data, step, kind, memory, flags)
@@ -294,7 +298,7 @@ def encode_frames(
 ) -> int:
     """Code frames (frames, n_channels) of a group; otherwise as ``decode_frames``.
 
-    Returns the frame of a value that is too large, of which nothing is coded or remembered, or -1.
+    Returns the frame with a value that is too large, which is neither coded nor remembered, or -1.
     """
     plan, n_group = choice.plan, choice.n_group
     values, vectors = past.values, transform.vectors

@@ -104,7 +104,7 @@ class _Writer:
         return LTR
 
     def code(self, frames: Floats, n_group: int | None = None) -> Unit:
-        """The unit of frames of one group of ``n_group`` frames; raises MotionError."""
+        """Encode frames as a unit of a group of ``n_group`` frames; raises MotionError."""
         if not self.frames_left and self._waiting is not None:
             self.parameters, self._waiting = self._waiting, None
             set_plan(self.plan, self.parameters, self.layout, self.coder.space.step)

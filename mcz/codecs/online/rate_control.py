@@ -227,7 +227,7 @@ def choose_options(sample: Sample, chosen: Params) -> tuple[Choice, int]:
 
 
 def choose_live_options(layout: Layout, chosen: Params) -> tuple[Choice, int]:
-    """The same before any frame is known."""
+    """Like ``choose_options``, before any frame is known."""
     sample, _ = space_choices.live_sample(NAME, layout, chosen["basis"])
     step = chosen["step"]
     if step is None and chosen["bitrate"] is None:

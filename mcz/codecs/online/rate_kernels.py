@@ -34,9 +34,9 @@ MOST_CARRY = 8.0  # groups' bits that may be left: what still frames do not need
 NEVER = 1e3  # log2 of a step with which all coefficients are 0
 FINEST, COARSEST = -8.0, 24.0  # log2 of other steps if a rate is held
 INTRA_LEVELS = 3.0  # log2 of the steps that the largest coefficient of an intra coded LTR has
-FALL = 0.9  # of STEADY: log2 of the bits falls by so much if log2 of the step rises by 1
+FALL = 0.9  # STEADY: fall of log2(bits) for a rise of log2(step) by 1
 FOLLOW = 2.0  # costs follow what frames cost by this share in a buffer's time
-LEAST_SHARE, LEAST_BITS = 0.1, 0.3  # of the bits of a group; of a frame
+LEAST_SHARE, LEAST_BITS = 0.1, 0.3  # share of the bits of a group, and of a frame
 FIRST_COST = 8.0  # of an LTR, if none is known, in costs of an STR
 
 # Rates are tabled by log2 of the step over the deviation: from -LOW on, PER_OCTAVE a doubling.
@@ -115,7 +115,7 @@ def ltr_step(
 ) -> float:
     """log2 of the step of an LTR frame, of a group of ``n_frames``.
 
-    If a rate is held, an intra coded one, which nothing predicts, is never wholly 0.
+    Under a rate, an intra coded frame, which has no prediction, is never all 0.
     """
     step = _ltr_step(plan, coefficients, intra, n_frames, laplace)
     if plan[MODE] == MOD:
@@ -174,9 +174,8 @@ def settle(plan: Floats, kind: int, used: float, bits: float, variance: float) -
 def _settle_steady(plan: Floats, kind: int, used: float, bits: float, empty: bool) -> None:
     """Update the excess over the rate and the current cost of frames.
 
-    Of an ``empty`` frame, in which nothing was coded, it is known only what it costs at most.
-
-    What an intra coded LTR takes beyond another is shared out among all frames up to the next.
+    An ``empty`` frame, in which nothing was coded, gives only an upper bound of the cost. The extra
+    bits of an intra coded LTR are spread over all frames up to the next one.
     """
     share = plan[GROUP_BITS] / plan[GROUP_FRAMES]
     plan[AHEAD] = max(plan[AHEAD] + bits - share, -share * plan[BUFFER])

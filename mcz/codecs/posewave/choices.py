@@ -349,7 +349,7 @@ def best_levels(
 
 
 def _minimize(counts: Sequence[int], score: Callable[[int], float]) -> int:
-    """The one with the lowest score, of scores that fall and then rise."""
+    """The item with the lowest score; scores fall, then rise."""
     scores = [score(counts[k]) for k in (1, 2)]
     at, way = (2, 1) if scores[1] < scores[0] else (1, -1)
     lowest = min(scores)

@@ -1,4 +1,4 @@
-"""Encoder choice of contact points, and of the frames in which each is held.
+"""Encoder choice of contact points, and of the frames that hold each.
 
 SPEC.md, "Held contacts", defines their effect; decoders do not need it.
 """
@@ -172,7 +172,7 @@ def choose_contacts(
 
 
 def _group_joints(skeleton: Skeleton, joints: Sequence[int]) -> list[list[int]]:
-    """Joints one of which is below the other, as a toe below its foot."""
+    """Groups of joints on one chain, such as a foot and its toe."""
     groups: list[list[int]] = []
     for joint in joints:
         path = set(path_of(skeleton.parents, joint))

@@ -23,7 +23,7 @@ MAX_POINTS = 8
 MAX_ROUNDS = 6
 MAX_RAMP = 64
 START_UNITS = 16  # of a step, for the place at which a contact begins
-MOST_STEPS = 4.0  # greatest steps by which a channel may be corrected
+MOST_STEPS = 4.0  # limit of a channel's correction, in greatest steps
 
 
 class PointFields(Record):

@@ -1,4 +1,4 @@
-"""Contacts: frames in which a point keeps the displacement that it has in the source.
+"""Contacts: frames in which a point keeps its displacement of the source.
 
 SPEC.md, "Held contacts", is normative. They follow the finest details. A stream codes the
 displacements of points on a fine grid, and a decoder changes the pose as little as possible to meet
@@ -171,7 +171,7 @@ COUNTERED = 0.5  # of the error of a point
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Frames of a contact: of a segment or, before, of a clip.
+    """Frames of a contact, in a segment or, before the split, in a clip.
 
     ``point`` is its number in the header, ``origin`` the first frame of the whole contact, a frame
     of the clip. ``stance``: pieces of the same number are contacts of a foot that overlap in time;
@@ -334,7 +334,7 @@ class ContactTracker:
     def _outcomes(
         self, corrections: Corrections, pieces: Sequence[Piece], targets: Floats
     ) -> list[Outcome]:
-        """Error of each piece against the position in which its contact began."""
+        """Error of each piece relative to the position at which its contact began."""
         places = corrections.positions_of(corrections.values)
         outcomes = []
         for piece in pieces:

@@ -7,7 +7,7 @@ function serves encoder and decoder. Imported on first use only.
 from __future__ import annotations
 
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.mixing import LIMIT, adaptive, code, mixed, number
+from mcz.codecs.coding.mixing import LIMIT, code_adaptive, code_bit, code_bits, code_mixed
 from mcz.codecs.coding.residuals import bits
 from mcz.codecs.posewave.model_state import (
     C_ESCAPE,
@@ -23,7 +23,7 @@ from mcz.codecs.posewave.model_state import (
 from mcz.kernels.types import Bytes, Ints
 
 BIAS = 77
-INSIDE = (1 << 24) - 1  # no index of a slot is larger: says that none is below zero
+INSIDE = (1 << 24) - 1  # bound of slot indices; tells the compiler that none is negative
 FIRST_ESCAPED = 49
 MOST_LENGTH = 32
 LEAST_CHANCE = 16
@@ -89,7 +89,7 @@ def code_decision(model: Model, data: Bytes, bit: int, slot: int, where: Context
     one, other = model.weights[where[ONE], slot], model.weights[where[OTHER], slot]
     second = model.second[where[SECOND], slot]
     chance, final, x = predict_bit(model, slot, one, other, second)
-    bit = code(model.coder, data, bit, final)
+    bit = code_bit(model.coder, data, bit, final)
     learn_bit(model, slot, one, other, second, bit, chance, x)
     return bit
 
@@ -100,7 +100,7 @@ def code_error(model: Model, data: Bytes, error: int, where: Contexts) -> int:
         return 0
     far = (1 if error < 0 else 0) ^ where[DOWN] ^ 1
     signs = C_SIGN + where[SIGN_1], C_SIGN + where[SIGN_2], C_SIGN + where[SIGN_3]
-    far = mixed(model.coder, data, far, M_SIGN + where[LEVEL], signs[0], signs[1], signs[2])
+    far = code_mixed(model.coder, data, far, M_SIGN + where[LEVEL], signs[0], signs[1], signs[2])
     model.at[0] += far * N_SLOTS
     size = abs(error)
     bucket, coded_size = bucket_of(size), 1
@@ -128,16 +128,16 @@ def code_rest(coder: Ints, data: Bytes, size: int, bucket: int, level: int) -> i
         n = (bucket - 3) >> 1
         low = ((4 if bucket & 1 else 6) << (n - 1)) + 1
         rest = size - low
-        top = adaptive(coder, data, rest >> (n - 1) & 1, C_EXTRA + bucket)
-        return low + (top << (n - 1)) + number(coder, data, rest, n - 1)
+        top = code_adaptive(coder, data, rest >> (n - 1) & 1, C_EXTRA + bucket)
+        return low + (top << (n - 1)) + code_bits(coder, data, rest, n - 1)
     rest = size - FIRST_ESCAPED + 1
     length, coded_rest = bits(max(rest, 0)), 1
     while coded_rest < MOST_LENGTH:
         context = C_ESCAPE + level * MOST_LENGTH + coded_rest
-        if adaptive(coder, data, 1 if length > coded_rest else 0, context) == 0:
+        if code_adaptive(coder, data, 1 if length > coded_rest else 0, context) == 0:
             break
         coded_rest += 1
-    rest = 1 << (coded_rest - 1) | number(coder, data, rest, coded_rest - 1)
+    rest = 1 << (coded_rest - 1) | code_bits(coder, data, rest, coded_rest - 1)
     return FIRST_ESCAPED - 1 + rest
 
 
@@ -171,7 +171,7 @@ def cost_of_size(model: Model, error: int, where: Contexts) -> int:
 
 
 def mixed_chance(coder: Ints, mixer: int, contexts: tuple[int, int, int]) -> int:
-    """The probability with which ``mixing.mixed`` would code a 1."""
+    """The probability with which ``mixing.code_mixed`` would code a 1."""
     dot, at = 0, mixing.WEIGHTS + 3 * mixer
     for context in contexts:
         dot += coder[at] * coder[mixing.STRETCH + (coder[mixing.MODELS + 2 * context] >> 4)]

@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcz.codecs.coding.mixing import ENCODING, adaptive, mixed
+from mcz.codecs.coding.mixing import ENCODING, code_adaptive, code_mixed
 from mcz.codecs.posewave import head_kernels as head
 from mcz.codecs.posewave.contact_plan import START_UNITS
 from mcz.codecs.posewave.head_kernels import code_number
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, Floats3, Ints, Ints2
 
-# What a number is about, of the contexts of ``code_number``.
+# Kinds of numbers, each with contexts of its own in ``code_number``.
 COUNT, GAP, LENGTH, START, ESCAPE = range(5)
 N_SIZES, N_BITS = 16, 16  # classes of magnitudes; bits of a magnitude before it escapes
 C_FAST = head.N_CONTEXTS
@@ -87,8 +87,8 @@ def code_point(
     """Code the contacts of a point, in place; -1, or the frame where one is impossible.
 
     ``places`` (n_frames + 2, 3), the first and the last of them twice, ``wanted`` (n_frames, 3),
-    displacements, and ``radii`` (n_frames,) are in length units. Of displacements an encoder
-    chooses what is cheap among what is no farther than ``radii`` from ``wanted``.
+    displacements, and ``radii`` (n_frames,) are in length units. An encoder chooses cheap
+    displacements no farther than ``radii`` from ``wanted``.
     """
     stands, starts, moves = contacts.stands, contacts.starts, contacts.moves
     n_frames, before = len(stands), 0
@@ -154,7 +154,7 @@ def _length(stands: Ints, first: int) -> int:
 def _code_start(state: Ints, data: Bytes, move: Ints) -> int:
     """Code the displacement that a contact begins with."""
     moved = 1 if move[0] != 0 or move[1] != 0 or move[2] != 0 else 0
-    if adaptive(state, data, moved, C_MOVED):
+    if code_adaptive(state, data, moved, C_MOVED):
         for i in range(3):
             value = code_number(state, data, 0, START, move[i])
             if abs(value) > MAX_DISPLACEMENT:  # HOLD-11
@@ -186,7 +186,7 @@ def _code_move(state: Ints, data: Bytes, learner: Learner, last: Ints, move: Int
 
 
 def _nearest(value: float, axis: int, odd: int) -> int:
-    """The integer next to ``value``; of y and z that which is odd or even as x is."""
+    """The integer next to ``value``; for y and z with the parity of x."""
     if axis == 0:
         return int(np.floor(value + 0.5))
     return 2 * int(np.floor((value - odd) * 0.5 + 0.5)) + odd
@@ -310,7 +310,7 @@ def _code_residual(
     magnitude, size = abs(residual), 0
     while size < N_BITS:
         more = 1 if magnitude > size else 0
-        if not mixed(state, data, more, size, a + size, b + size, c + size):
+        if not code_mixed(state, data, more, size, a + size, b + size, c + size):
             break
         size += 1
     if size == N_BITS:
@@ -318,5 +318,5 @@ def _code_residual(
         size = N_BITS + more if 0 <= more < MAX_DISPLACEMENT else 4 * MAX_DISPLACEMENT
     if size == 0:
         return 0
-    negative = adaptive(state, data, 1 if residual < 0 else 0, C_SIGN + side)
+    negative = code_adaptive(state, data, 1 if residual < 0 else 0, C_SIGN + side)
     return -size if negative else size

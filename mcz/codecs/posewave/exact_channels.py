@@ -95,7 +95,7 @@ def cut_header(
 
 
 def most_frames(layout: Layout, groups: Sequence[int]) -> int:
-    """Greatest number of frames of a segment in which these groups can be exact."""
+    """Most frames of a segment that can keep these groups exact."""
     widest = max((len(layout.groups[group]) for group in groups), default=1)
     return min(MOST_ROWS, MOST_VALUES // widest)
 

@@ -6,7 +6,7 @@ first use only.
 
 from __future__ import annotations
 
-from mcz.codecs.coding.mixing import adaptive, number
+from mcz.codecs.coding.mixing import code_adaptive, code_bits
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Ints
 
@@ -30,13 +30,13 @@ def code_head(
     """
     before = 1
     for c in range(len(classes)):
-        before = adaptive(state, data, kept[c], first + C_KEPT + 2 * classes[c] + before)
+        before = code_adaptive(state, data, kept[c], first + C_KEPT + 2 * classes[c] + before)
         kept[c] = before  # PWAVE-18
         own = 2 * classes[c] + before
-        number = code_number(state, data, first, own, numbers[c])
-        if abs(number) >= 1 << MAX_LENGTH:
+        code_bits = code_number(state, data, first, own, numbers[c])
+        if abs(code_bits) >= 1 << MAX_LENGTH:
             return 1
-        numbers[c] = number
+        numbers[c] = code_bits
     return 0
 
 
@@ -47,7 +47,7 @@ def code_number(state: Ints, data: Bytes, first: int, own: int, value: int) -> i
     """
     size, length = abs(value), 0
     at = first + C_LENGTH + MAX_LENGTH * own
-    while adaptive(state, data, 1 if size >> length else 0, at + length):
+    while code_adaptive(state, data, 1 if size >> length else 0, at + length):
         length += 1
         if length == MAX_LENGTH:  # PWAVE-19, HOLD-08
             return 1 << MAX_LENGTH
@@ -56,8 +56,8 @@ def code_number(state: Ints, data: Bytes, first: int, own: int, value: int) -> i
     coded = 1
     if length > 1:
         at = first + C_SECOND + MAX_LENGTH * own + length
-        coded = 2 + adaptive(state, data, size >> (length - 2) & 1, at)
+        coded = 2 + code_adaptive(state, data, size >> (length - 2) & 1, at)
     if length > 2:
-        coded = coded << (length - 2) | number(state, data, size, length - 2)
-    negative = adaptive(state, data, 1 if value < 0 else 0, first + C_SIGN + own)
+        coded = coded << (length - 2) | code_bits(state, data, size, length - 2)
+    negative = code_adaptive(state, data, 1 if value < 0 else 0, first + C_SIGN + own)
     return -coded if negative else coded

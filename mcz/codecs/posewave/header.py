@@ -152,7 +152,7 @@ class Header:
 
     @property
     def may_go_on(self) -> bool:
-        """True if a segment may continue the state of the one before it."""
+        """Return True if a segment may continue the state of the previous one."""
         rest = self.orders or self.exact_groups or self.contacts
         return self.levels == 0 and not rest  # PWAVE-28
 

@@ -18,7 +18,7 @@ Streams = tuple[bytes, ...]
 
 
 class Trial(NamedTuple):
-    """All by which encodes of one segment of a clip differ: ``octaves`` of its frames, too."""
+    """Settings that differ between encodes of one segment, with the ``octaves`` of its frames."""
 
     header: bytes
     first: int

@@ -106,7 +106,7 @@ def _measure(
 def _stiffen(
     plan: Plan, motions: Floats3, inertia: Floats3, origins: Floats3, entries: Floats2, lanes: int
 ) -> None:
-    """Add to the diagonal of each turn a share of the inertia of all that its joint moves."""
+    """Add to each turn's diagonal a share of the inertia that its joint moves."""
     for number in range(len(plan.joints)):
         joint, last = plan.joints[number], plan.starts[number + 1] - 1
         if joint != PLAIN:
@@ -141,8 +141,8 @@ def _eliminate(
 ) -> None:
     """Entries of G to those of L, from the last channel to the first, without any new entry.
 
-    Two channels of which one comes right after the other on its path go together: what is above
-    both is read and written once.
+    Two channels that are neighbors on a path go together: what is above both is read and written
+    once.
     """
     starts, path = plan.starts, plan.path
     own, shares, own_2, shares_2 = batch.own, batch.shares, batch.own_2, batch.shares_2
@@ -192,7 +192,7 @@ def _take_pivot(
 def _subtract(
     entries: Floats2, top: int, i: int, own: Floats2, shares: Floats2, lanes: int
 ) -> None:
-    """Subtract the share of ``row`` from the row at ``top``, of channel i of a path."""
+    """Subtract the share of ``row`` from the row at ``top``, that of channel i of a path."""
     for k in range(i + 1):
         for p in range(lanes):
             entries[top + k, p] -= shares[i, p] * own[k, p]
@@ -233,7 +233,7 @@ def inverse_root(value: float) -> float:
 
 
 MEMORY = 0.97  # of what was learned, from row to row
-PRIOR, PRIOR_SHARE = 0.25, 0.5  # (PRIOR * greatest step)^2 times 4, and the share it stands for
+PRIOR, PRIOR_SHARE = 0.25, 0.5  # (PRIOR * greatest step)^2 times 4, and its share
 
 
 class Course(NamedTuple):

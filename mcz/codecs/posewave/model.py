@@ -41,7 +41,7 @@ N_SECOND = 33
 START_ENERGY = 500.0
 
 N_LOGS = 1024
-VARIANCE = 2.0  # initial, of a channel
+VARIANCE = 2.0  # initial variance of a channel
 N_MIXER_WEIGHTS = mixing.MODELS - mixing.WEIGHTS
 
 
@@ -244,7 +244,7 @@ def priors() -> tuple[Prior, ...]:
 
 
 def number_of(skeleton: Skeleton) -> int:
-    """The number, from 1, of the prior that was trained on skeletons like this one; else 0."""
+    """Number, from 1, of the prior trained on skeletons like this one; 0 if there is none."""
     layout = layout_of(skeleton)
     for number, table in enumerate(_document()["priors"], 1):
         if layout == (table["parents"], table["channels"]):
@@ -253,7 +253,7 @@ def number_of(skeleton: Skeleton) -> int:
 
 
 def layout_of(skeleton: Skeleton) -> tuple[list[int], list[str]]:
-    """The parents and the kinds of channels of joints, by which a prior is chosen."""
+    """Parents and kinds of channels of all joints: the key of a prior."""
     joints = skeleton.joints
     kinds = [" ".join(channel.kind for channel in joint.channels) for joint in joints]
     return [joint.parent for joint in joints], kinds

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.mixing import adaptive, mixed
+from mcz.codecs.coding.mixing import code_adaptive, code_mixed
 from mcz.codecs.posewave.channel_kernels import (
     expect,
     forget_block,
@@ -81,9 +81,9 @@ def code_rows(
 ) -> int:
     """Code the rows ``first`` to ``last`` of a level in place; return the row of a fault, or -1.
 
-    An encoder chooses by ``lam``, as so many squares of a step as a bit is worth. Exponents are
-    coded where ``refining`` is 1, and otherwise 0. ``dependent``: 1 where each integer decides
-    among which numbers the next value is.
+    ``lam``: squares of a step that a bit is worth to an encoder. Exponents are coded if
+    ``refining`` is 1, and otherwise 0. ``dependent`` 1: each integer decides which numbers the next
+    value may take.
     """
     q, exponents, is_kept = rows.q, rows.exponents, rows.is_kept
     here, parent, grand = rows.here, rows.parent, rows.grand
@@ -108,7 +108,7 @@ def code_rows(
                 flags,
                 dependent,
             )
-        if mixed(coder, data, live, M_FLAG + level, flags[0], flags[1], flags[2]) == 0:
+        if code_mixed(coder, data, live, M_FLAG + level, flags[0], flags[1], flags[2]) == 0:
             q[row] = 0
             here[row + 3] = 0.0
             exponents[row] = 0
@@ -130,7 +130,7 @@ def code_exponent(coder: Ints, data: Bytes, exponent: int, earlier: int) -> int:
     """Code the refinement of a row in octaves; ``earlier``: that of the row before."""
     at, coded = C_EXPONENT + MAX_EXPONENT * earlier, 0
     while coded < MAX_EXPONENT:
-        if adaptive(coder, data, 1 if exponent > coded else 0, at + coded) == 0:
+        if code_adaptive(coder, data, 1 if exponent > coded else 0, at + coded) == 0:
             break
         coded += 1
     return coded
@@ -161,7 +161,7 @@ def flag_contexts(
 def code_row(
     model: Model, data: Bytes, q: Ints, row: Floats, level: int, exponent: int, dependent: int
 ) -> int:
-    """Code a live row, of which the model knows the surroundings; return 1 for a fault, else 0.
+    """Code a live row, whose surroundings the model knows; return 1 for a fault, else 0.
 
     ``row`` (2 wide,) are its magnitudes and values in steps of the level, of which one is
     2^``exponent`` of the row's own.

@@ -12,7 +12,7 @@ from mcz.kernels.types import Flags, Floats, Floats2, Floats3, Ints, Ints2, Ints
 N_LEVELS = 6
 MAX_INDEX = 1 << 30
 BLOCK = 64  # channels at most that are predicted from one another
-LANES = 32  # rows of magnitudes and of values have a multiple of this, behind which are zeros
+LANES = 32  # rows of magnitudes and of values are padded with zeros to a multiple of this
 
 # Features of a channel: magnitudes of coefficients around it.
 N_FEATURES = 16
@@ -35,7 +35,7 @@ N_CLASSES = 6
 # Contexts and mixers in ``coder``, as those of ``coding.mixing``.
 C_FLAG, C_SIGN, C_EXTRA, C_ESCAPE, C_EXPONENT = 0, 208, 416, 428, 620
 MAX_EXPONENT = 7
-N_SMALL = C_EXPONENT + (MAX_EXPONENT + 1) * MAX_EXPONENT  # behind them are those of the head
+N_SMALL = C_EXPONENT + (MAX_EXPONENT + 1) * MAX_EXPONENT  # after them are those of the head
 M_FLAG, M_SIGN, N_SMALL_MIXERS = 0, N_LEVELS, 2 * N_LEVELS
 
 # A path through a row, behind the means of a block: magnitudes of four channels, their sum; of a
@@ -46,16 +46,16 @@ PATH_ROW, PATH_SCALED, PATH_COST, N_PATH = BLOCK + 8, BLOCK + 9, BLOCK + 10, BLO
 
 
 class Model(NamedTuple):
-    """All that is known; ``wide`` is the number of channels rounded up to ``LANES``, one to spare.
+    """The state; ``wide`` is the number of channels rounded up to ``LANES``, one to spare.
 
     ``coder`` is a state of ``coding.mixing``. ``slots`` are the contexts of opinions, p << 8 | n
-    each; ``weights`` (sets, slots, inputs), one set for each channel behind the shared ones;
-    ``second`` (scales, slots, 33). ``at`` and ``inputs`` are what is thought of one decision.
-    ``columns`` (blocks, 64, 64), ``variances`` (blocks, 64) and ``seen``, how many rows they know,
-    are the prediction across channels, ``taps`` (2 levels, 5) and ``tap_energy`` that in time;
-    ``level_weights`` (levels, 16) and ``own_weights`` (16, wide) predict magnitudes.
-    ``paths`` (2, states, ``N_PATH``) are those before and after a channel, ``ways`` (n, states, 3)
-    lead to them in an encoder. The others are tables and room to work in.
+    each; ``weights`` (sets, slots, inputs), one set for each channel after the shared ones;
+    ``second`` (scales, slots, 33). ``at`` and ``inputs`` describe one decision. ``columns``
+    (blocks, 64, 64), ``variances`` (blocks, 64) and ``seen``, how many rows they know, are the
+    prediction across channels, ``taps`` (2 levels, 5) and ``tap_energy`` that in time;
+    ``level_weights`` (levels, 16) and ``own_weights`` (16, wide) predict magnitudes. ``paths`` (2,
+    states, ``N_PATH``) are those before and after a channel, ``ways`` (n, states, 3) lead to them
+    in an encoder. The others are tables and room to work in.
     """
 
     coder: Ints

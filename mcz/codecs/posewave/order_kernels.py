@@ -62,7 +62,7 @@ def _fill_matrix(m: Floats, row: Floats, order: Ints, rule: Rule) -> None:
 
 
 def _fill_vector_matrix(m: Floats, row: Floats, radians: float) -> None:
-    x, y, z = _limited(row[0]) * radians, _limited(row[1]) * radians, _limited(row[2]) * radians
+    x, y, z = _limit(row[0]) * radians, _limit(row[1]) * radians, _limit(row[2]) * radians
     square = x * x + y * y + z * z
     if not square < LONGEST:
         x = y = z = square = 0.0
@@ -73,7 +73,7 @@ def _fill_vector_matrix(m: Floats, row: Floats, radians: float) -> None:
     m[6], m[7], m[8] = b * xz - a * y, b * yz + a * x, 1.0 - b * (xx + yy)
 
 
-def _limited(value: float) -> float:
+def _limit(value: float) -> float:
     return value if abs(value) < BEYOND else 0.0
 
 
@@ -136,7 +136,7 @@ def follow_angles(angles: Floats2, sequence: Ints, full: float, notes: IntColumn
 
 @kernel
 def follow_vectors(angles: Floats2, sequence: Ints, full: float, rule: Rule) -> None:
-    """Convert angles of a sequence to rotation vectors, each near the one before, in place."""
+    """Convert a sequence of angles to rotation vectors in place, each near the previous one."""
     m, q, before = np.empty(9), np.empty(4), np.zeros(3)
     for row in angles:
         _fill_matrix(m, row, sequence, rule)

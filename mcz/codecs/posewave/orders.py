@@ -65,7 +65,7 @@ def own_sequence(joint: Joint, skeleton: Skeleton) -> AxisSequence | None:
 
 
 def columns_by_axis(skeleton: Skeleton, index: int) -> list[int]:
-    """The columns of the rotations about x, y and z, of a joint that has one each."""
+    """Columns of a joint's rotations about x, y and z; the joint has one of each."""
     kinds = [channel.kind for channel in skeleton.joints[index].channels]
     start = skeleton.columns(index).start
     return [start + kinds.index(kind) for kind in ROTATION_KINDS]
@@ -96,7 +96,7 @@ class Orders:
         self.places = [_reordered_joint(skeleton, joint, code) for joint, code in codes.items()]
 
     def to_coded_order(self, values: Floats) -> Floats:
-        """``values`` of the source, (n_frames, n_channels), as they are coded."""
+        """Convert ``values`` of the source, (n_frames, n_channels), to coded orders."""
         if not self.places:
             return values
         coded, nothing = values.copy(), np.zeros((len(values), N_NOTES), np.int64)
@@ -197,7 +197,7 @@ GREATEST = 2.0**20  # of an angle, whose sine is exact enough in any unit
 
 
 def choose_orders(name: str, source: SignalSource, exact: Container[int] = ()) -> dict[int, int]:
-    """Choose codes of orders by joint, of joints that are calmer in another than the source's.
+    """Choose an order for each joint that is calmer in another order than the source's.
 
     Joints with ``exact`` channels keep the source's order. Angles that jump or turn fast cost
     bytes: bits by the logarithms of their second differences, approximated by roots.

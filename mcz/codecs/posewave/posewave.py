@@ -229,7 +229,7 @@ def _segments(
 
 
 def _lossy(header: Header, layout: Layout) -> list[int]:
-    """The groups of lossy channels, the first of which has the streams."""
+    """The groups of lossy channels; the first has their streams."""
     return [group for group in range(len(layout.groups)) if group not in header.exact_groups]
 
 

@@ -75,7 +75,7 @@ def learn_in_time(model: Model, values: Floats, level: int, row: int, share: flo
 
 
 def total_of(values: Floats) -> float:
-    """The sum of values, a multiple of ``LANES`` of them; they are folded, and used up."""
+    """The sum of values, whose number is a multiple of ``LANES``; overwrites them."""
     for start in range(LANES, len(values), LANES):
         part = values[start : start + LANES]
         for c in range(LANES):

@@ -59,10 +59,10 @@ def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: s
 
 
 class RowMemory:
-    """The rows of a segment as they were coded last, for an encode that differs in few of them.
+    """The last coded rows of a segment, for an encode in which few of them differ.
 
-    Only the steps of some rows may differ: all others keep their values, which takes less time than
-    choosing them, and lets errors elsewhere be as they were.
+    Only the steps of some rows may differ: all others keep their values, which is faster than
+    choosing them, and keeps errors elsewhere.
     """
 
     def __init__(self) -> None:
@@ -140,7 +140,7 @@ class RowCoder:
 
     @property
     def exponents(self) -> Ints:
-        """Octaves by which steps of rows of the stream are finer, (n_rows,)."""
+        """Octaves by which the steps of each row are finer, (n_rows,)."""
         return self._rows.exponents[self._n_known :]
 
     @property
@@ -159,7 +159,7 @@ class RowCoder:
         if not (np.abs(rows) < model_kernels.MOST_WANTED).all():  # NaN too
             raise MotionError(TOO_LARGE)
         self._run(rate_weight)
-        return self._decoded()
+        return self._row_values()
 
     def encode_course(
         self,
@@ -197,14 +197,14 @@ class RowCoder:
         if not self.n_kept:
             if not self.stream.is_whole:  # PWAVE-20, PWAVE-30
                 raise FormatError("rows have bytes, but no channel is kept", where=self.where)
-            return self._decoded()
+            return self._row_values()
         self._run(-1.0)
         if ends and not self.stream.is_whole:  # ROWS-01
             raise FormatError(
                 f"rows of kind {self.kind} should not have {len(self.stream.data)} bytes",
                 where=self.where,
             )
-        return self._decoded()
+        return self._row_values()
 
     def _run(self, rate_weight: float) -> None:
         if not self.n_kept:
@@ -227,5 +227,5 @@ class RowCoder:
                 f"row {fault} of level of kind {self.kind} is out of range", where=self.where
             )
 
-    def _decoded(self) -> Floats:
+    def _row_values(self) -> Floats:
         return np.multiply(self.doubles, 0.5, dtype=np.float64)

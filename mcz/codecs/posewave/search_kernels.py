@@ -1,8 +1,8 @@
 """Compiled: an encoder's choice of the values of a row, by Viterbi's search through its channels.
 
-Of all paths into a state of dependent quantization, the one with the least square error and bits
-goes on, with all that the model expects of later channels after it. Without dependent quantization
-there is one path. Decoders need none of this.
+Each state of dependent quantization keeps the path with the least squared error and bits, and what
+the model expects of the channels after it. Without dependent quantization there is one path.
+Decoders need none of this.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from mcz.codecs.posewave.prediction_kernels import gather_magnitudes, predict_in
 from mcz.kernels.types import Floats, Floats2, Ints, Ints2
 
 NEVER = 1e300
-HOPELESS = 1.2  # squares of a step by which a path is worse than the best one, and is given up
+HOPELESS = 1.2  # a path worse than the best by so many squared steps is given up
 LEAST = 0.5  # steps: a row of less is all zeros
 MOST_ZEROED = 2.0  # steps: a greater value is never left out
 FROM, TWICE, STILL = range(3)  # of a way: state before, twice the value, 1 for a still channel

@@ -145,7 +145,7 @@ def _sums(
 ) -> None:
     """Write the points of one matrix in ``n_frames`` frames, before step, weight and mean.
 
-    ``sums`` (n_points + 1, BLOCK_FRAMES) has room for one row of coefficients behind the points.
+    ``sums`` (n_points + 1, BLOCK_FRAMES) has room for one row of coefficients after the points.
     """
     n_points = vectors.shape[1]
     course = sums[n_points]

@@ -105,7 +105,7 @@ def _vectors(coder: _Coder, source: SignalSource, length: int) -> Iterator[Ints]
 
 
 def _segments(source: SignalSource, coder: _Coder, length: int) -> Iterator[Segment]:
-    """Segments of ``length`` frames, or, if 0, of as many as make a DATA of the usual size."""
+    """Segments of ``length`` frames; 0: as many as fill a DATA of the usual size."""
     layout = source.layout
     if not layout.n_channels:
         if layout.n_frames:
@@ -257,7 +257,7 @@ class _Coder:
 
 
 class _LiveEncoder(LiveEncoder):
-    """One frame a push, each a segment that needs the one before, periodically a fresh one."""
+    """Encodes a frame a push, as a segment that needs the previous one or is fresh."""
 
     version: int | None = None
 

@@ -43,12 +43,12 @@ from mcz.errors import MotionError
 from mcz.model.types import Floats, Ints, Params
 
 LARGEST = 2.0**60  # steps: a window with such a value has a coefficient beyond 2^40 steps
-BIT = math.log(2) / 4  # squared steps that a bit is worth: of fine steps log(2) / 6 would be
+BIT = math.log(2) / 4  # squared steps that a bit is worth; log(2) / 6 would be right for fine steps
 THRESHOLD = 0.7  # of a step: smaller coefficients become 0
 PER_ONE, PER_OCTAVE = 2.0, 1.5  # about the bits of a coefficient that is not zero
 ENTRY, ENTRY_OCTAVE = 0.5, 1.2  # estimated bits of an entry of a basis
 LESS_DIGITS = 1.0  # of a vector's entries than log2 of all its coefficients' size in steps
-MEAN_STEPS = 8  # parts of a step to which a mean is exact
+MEAN_STEPS = 8  # a mean is exact to a step divided by this
 LONGEST = 1024  # frames: courses of longer windows are too many
 ROOM = MAX_ENTRIES - 2**15  # for vectors and courses, in addition to a mean
 

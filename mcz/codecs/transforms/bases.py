@@ -32,7 +32,7 @@ from mcz.kernels.types import Floats2
 from mcz.model.types import Floats
 
 HALF_PI = 1.5707963267948966
-NEWTON_STEPS = 40  # of a square root; half of them would do
+NEWTON_STEPS = 40  # for a square root; half would suffice
 
 
 @lru_cache(maxsize=16)

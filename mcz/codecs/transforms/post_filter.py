@@ -34,7 +34,7 @@ def filter_middle(
     n_channels = rows.shape[1]
     choice, total = np.empty(n_channels, np.int64), np.empty(n_channels)
     patched = np.empty((2 * SIDE + 1, n_channels))
-    last_gap = -1  # the last row in which a number is unknown
+    last_gap = -1  # last row with an unknown number
     for row in range(2 * SIDE):
         if _has_gap(rows[row]):
             last_gap = row
@@ -112,7 +112,7 @@ RING = 1024  # rows that a stream holds before it moves them
 
 
 class PostFilter:
-    """The filter of rows that come one by one: each is returned when the 12th after it has arrived.
+    """Filter for rows that arrive one by one; it returns a row once the 12th after it is in.
 
     ``rate`` is rows a second, ``unit_cm`` the length unit of the numbers in cm. The output equals
     ``filter_rows`` of all rows bit for bit.

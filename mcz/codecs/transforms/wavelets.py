@@ -127,7 +127,7 @@ def synthesize_level(
     """Write samples n >= start of the next finer approximation, (samples, channels).
 
     ``out`` is all zeros. ``approx`` and ``detail`` hold the coefficients from number ``first`` on,
-    a column a channel; a ``detail`` without rows stands for zeros, which are not even added.
+    a column a channel; a ``detail`` without rows means zeros.
     """
     n_taps, n_channels = len(lo), approx.shape[1]
     for n in range(start, start + len(out)):

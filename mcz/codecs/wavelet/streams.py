@@ -29,7 +29,7 @@ from mcz.kernels.types import Bytes, Floats, IntColumns, Ints
 from mcz.model.schema import read_varint, varint
 
 MAX_INDEX = 1 << 40  # of a coefficient: sums of neighbors then stay far below 2^53
-OWN = 0, 0  # a stream has contexts and mixers of its own
+OWN = 0, 0  # first context and mixer: a stream has its own
 
 
 def predict(values: Ints, at: int, predictor: int) -> int:
@@ -77,9 +77,9 @@ def code_details(
 ) -> int:
     """Code values[:count] in place; return the index of a fault or -1.
 
-    ``coarser`` has what the next coarser band says of the activity there, and the side of its
-    coefficients, (2, n); coefficient ``at`` lies above its column (at + shift) // 2. No value that
-    is not zero is smaller than ``least``.
+    ``coarser`` has the activity in the next coarser band and the side of its coefficients, (2, n);
+    coefficient ``at`` lies above its column (at + shift) // 2. No value that is not zero is smaller
+    than ``least``.
     """
     n_coarser = coarser.shape[1]
     run = last = before = side_1 = side_2 = 0

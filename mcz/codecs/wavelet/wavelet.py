@@ -33,7 +33,7 @@ from mcz.model.schema import UVARINT, Checked, Record, bounded, build, counted, 
 from mcz.model.types import Bools, Floats, Ints
 
 NAME = "wavelet"
-LEAST_FRAMES = 256  # of a segment: in fewer, hundreds of channels would cost more than they save
+LEAST_FRAMES = 256  # of a segment; a shorter one of hundreds of channels is mostly overhead
 INWARD = 1 / 16  # of a step: distance that a scaled detail is set back towards zero (MRDWT-34)
 
 TAPS = counted(Float64l, MAX_TAPS)  # MRDWT-06
@@ -80,8 +80,8 @@ class Transform:
 class Plan:
     """Encoder decisions before the first segment.
 
-    ``kept``: band by band of the clip, the coarsest first, mask of coefficients that do not become
-    0, (coefficients, channels); None: the quantizer decides.
+    ``kept``: for each band of the clip, the coarsest first, a mask (coefficients, channels) of
+    those that do not become 0; None: the quantizer decides.
     """
 
     name: str
@@ -107,9 +107,9 @@ class Plan:
 def transform_of(
     layout: Layout, wavelet: str, levels: int, *, as_published: bool = False
 ) -> Transform:
-    """The requested levels; fewer if the clip is too short for them.
+    """The transform with ``levels``, or with fewer if the clip is too short.
 
-    ``as_published``: all of them for any length.
+    ``as_published``: always with ``levels``.
     """
     wavelet_id, taps = by_name(wavelet)
     levels = levels if layout.n_frames else 0
@@ -160,7 +160,7 @@ def _lengths(layout: Layout, plan: Plan) -> Lengths:
 
 
 def segment_streams(frames: Frames, plan: Plan, first: int, stop: int) -> tuple[bytes, ...]:
-    """All streams of a segment: resolution by resolution, in each channel by channel."""
+    """The streams of a segment, by resolution, then by channel."""
     bands = frames.coefficients(first, stop)
     if plan.kept is not None:
         levels = [plan.levels, *range(plan.levels, 0, -1)]

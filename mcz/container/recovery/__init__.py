@@ -39,7 +39,7 @@ LEAST_RECOVERY = 4  # blocks, so that a small file survives some bad places
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Sizes of the protected bytes and of the code, from which the rest follows.
+    """Sizes of the protected bytes and of the code, which determine all others.
 
     The stream is bytes ``start`` to ``start + a_size`` of the file, the end of which the RECV
     follows, and the ``t_size`` bytes after the RECV.
@@ -326,7 +326,7 @@ def _close(spool: BinaryIO) -> None:
 
 
 def compute_lanes(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int, Ints]]:
-    """Lanes of all recovery blocks, of large ones some at a time, and the first of them."""
+    """Yield the first lane and the lanes of all recovery blocks, a part of large ones at a time."""
     lanes = shape.block_size // LANE
     width = max(1, min(lanes, AT_ONCE // (run_length(shape.n_recovery) * LANE)))
     for start in range(0, lanes, width):

@@ -5,8 +5,8 @@ where M is the least power of two >= the number of recovery blocks. SPEC.md, "RE
 rest. The blocks are computed as polynomials through runs of M data blocks.
 
 Elements of the field are 16-bit integers; their sum is exclusive or. No library fits: galois has
-the field, at some million products a second in arrays of its own; the fast ones (zfec, leopard) are
-of GF(2^8), under other licences, or not on PyPI.
+the field, but makes only some million products a second; fast ones (zfec, leopard) have GF(2^8),
+other licenses, or no package on PyPI.
 """
 
 from __future__ import annotations

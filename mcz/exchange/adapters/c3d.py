@@ -76,7 +76,7 @@ def c3d_bytes(motion: Motion) -> bytes:
 
 
 RoleArrays = dict[str | None, tuple[NDArray[np.float64], NDArray[np.bool_]]]
-OUTPUTS = "outputs"  # the role of the signal of outputs of models, which ezc3d has among the points
+OUTPUTS = "outputs"  # role of the signal of model outputs, which ezc3d has among the points
 REFUSED = (OSError, ValueError, RuntimeError, LookupError)  # what ezc3d raises
 NOTE = "numbers that binary32 cannot hold: without the events and parameters of its C3D"
 

@@ -92,7 +92,7 @@ def from_movement(
     """
     if not hasattr(dataset, "data_vars") or "position" not in dataset:
         raise OptionError("not a poses dataset of movement: it has no variable 'position'")
-    position = _ordered(dataset["position"], DIMS)
+    position = _transpose(dataset["position"], DIMS)
     space = [str(axis) for axis in position["space"].values]
     if space not in (["x", "y"], ["x", "y", "z"]):
         raise OptionError(f"positions are along {', '.join(space)}, not x, y or x, y, z")
@@ -106,7 +106,7 @@ def from_movement(
     joints = tuple(Joint(each, channels=channels) for each in names)
     signals = [_signal(places.reshape(len(places), -1), "motion", None)]
     if "confidence" in dataset:
-        sure = _ordered(dataset["confidence"], (DIMS[0], *DIMS[2:])).values.transpose(0, 2, 1)
+        sure = _transpose(dataset["confidence"], (DIMS[0], *DIMS[2:])).values.transpose(0, 2, 1)
         if np.isfinite(sure).any():
             of_points = tuple(Channel("", each) for each in names)
             signal = _signal(sure.reshape(len(sure), -1), CONFIDENCE, of_points)
@@ -143,7 +143,7 @@ def _confidence(motion: Motion, places: Reals) -> Floats:
     return np.asarray(np.isfinite(places).all(axis=3), np.float64)
 
 
-def _ordered(array: DataArray, dims: tuple[str, ...]) -> DataArray:
+def _transpose(array: DataArray, dims: tuple[str, ...]) -> DataArray:
     """The array with its axes in this order; raises OptionError for other axes."""
     array = array.rename({old: new for old, new in SINGULAR.items() if old in array.dims})
     if set(array.dims) != set(dims):

@@ -165,7 +165,7 @@ def loose_tails(skeleton: Skeleton, index: int) -> tuple[Vector, ...]:
 
 
 def _angles(skeleton: Skeleton, index: int, values: Floats) -> tuple[str, Floats]:
-    """An order and the angles, (n_frames, 3) in degrees, of the joint's own rotation C M C^-1."""
+    """Axis order and angles, (n_frames, 3) in degrees, of the joint's own rotation C M C^-1."""
     part, columns = _part(skeleton, values, (index, TURNING_KINDS))
     if not len(columns):
         return "zyx", np.zeros((len(values), 3))
@@ -198,8 +198,8 @@ def _part(
 ) -> tuple[Chain, Floats]:
     """A chain of some joints, with only channels of some kinds, and its values.
 
-    Each joint is (index, kinds) and is the child of the one before. Joints that do not move are at
-    the origin. The values are (n_channels, n_frames).
+    Each joint is (index, kinds) and is the child of the previous one. Joints that do not move are
+    at the origin. The values are (n_channels, n_frames).
     """
     joints, numbers = [], []
     for number, (index, kinds) in enumerate(chosen):

@@ -23,7 +23,7 @@ SCENES = ("glb", "usda")
 GROUPS = ("POINT", "ANALOG", "FORCE_PLATFORM", "EVENT", "TRIAL")  # of C3D, written or named
 SHAPED = ("bvh", "amc", *POINTS, *SCENES)  # a skeleton or its points
 UNNUMBERED = ("bvh", "sto", "mot", *SCENES)
-HELD_ROLES = {"c3d": KNOWN}  # roles of signals other than the motion, of the formats that hold any
+HELD_ROLES = {"c3d": KNOWN}  # formats that hold other signals, and the roles of these
 ROOT = "root"  # the only name that ASF has for it
 
 

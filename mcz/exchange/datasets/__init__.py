@@ -1,4 +1,4 @@
-"""Data sets: windows of many clips as arrays, for whoever trains or measures on them.
+"""Data sets: windows of many clips as arrays, for training and statistics.
 
 ``dataset`` finds the clips; ``field_table`` has the arrays that are made of them; ``open_files``
 reads the frames, ``feature_blocks`` computes and caches features; ``Dataset`` counts, cuts,

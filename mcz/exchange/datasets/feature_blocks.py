@@ -80,10 +80,10 @@ class MemoryCache:
 
 
 class FolderCache:
-    """Blocks as files of a folder, at most ``most_bytes`` of them; what is there stays there.
+    """Blocks as files of a folder, at most ``most_bytes`` of them; none is ever evicted.
 
-    Processes may share it: a file gets its name when it is whole, and one that is not what was
-    written is created again. Raises AccessError if the folder cannot be used.
+    Processes may share it: a file gets its name when it is complete, and a damaged one is written
+    again. Raises AccessError if the folder cannot be used.
     """
 
     SUFFIX = ".features"
@@ -123,7 +123,7 @@ class FolderCache:
 
 
 def _arrays_to_bytes(arrays: Arrays) -> bytes:
-    """Arrays as bytes: of each a line of its name, type and shape, then its values."""
+    """Arrays as bytes: for each a line with name, type and shape, then its values."""
     parts = []
     for name, array in arrays.items():
         shape = ",".join(map(str, array.shape))
@@ -190,7 +190,7 @@ class Blocks:
         )
 
     def parts(self, member: Member, start: int, stop: int) -> dict[str, list[Reals]]:
-        """The arrays of frames of a clip as parts of blocks, which nobody may change."""
+        """The arrays of frames of a clip as read-only parts of blocks."""
         parts: dict[str, list[Reals]] = {field.name: [] for field in self._recipe.fields}
         size = self.block_size(member)
         first = start // size
@@ -243,7 +243,7 @@ class Blocks:
 class FieldStatistics(NamedTuple):
     """Mean and standard deviation of a field over all frames, float64 of the shape of a frame.
 
-    Of values that are NaN in all frames both are NaN.
+    Both are NaN for values that are NaN in all frames.
     """
 
     mean: Floats

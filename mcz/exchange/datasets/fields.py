@@ -153,7 +153,7 @@ def features_of(
     margins: tuple[int, int],
     dtype: DTypeLike,
 ) -> dict[str, Reals]:
-    """The arrays of frames, of whose ``rows`` there are ``margins`` more before and after."""
+    """The arrays of frames; ``rows`` has ``margins`` more rows before and after."""
     first, last = margins
     arrays = {}
     for each in fields:

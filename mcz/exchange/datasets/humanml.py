@@ -41,7 +41,7 @@ LEFT_FOOT, RIGHT_FOOT = [7, 10], [8, 11]
 ACROSS = ((2, 1), (17, 16))
 ACROSS_SMOOTH = ((1, 2), (17, 16))
 N_FEATURES = 263
-SIGMA, RADIUS = 20, 80  # frames, of the Gaussian that smooths the heading
+SIGMA, RADIUS = 20, 80  # frames of the Gaussian that smooths the heading
 Y = np.array([0.0, 1.0, 0.0])
 
 
@@ -188,7 +188,7 @@ def _shortest_turn(start: Floats, ends: Floats) -> Floats:
 
 
 def _with_lengths(places: Floats, lengths: Floats) -> Floats:
-    """The same with bones of these lengths in their directions."""
+    """Positions with bones of these lengths, in their directions."""
     if lengths.shape != (len(JOINTS),) or not (lengths[1:] > 0).all():
         raise OptionError(
             f"bone_lengths must be {len(JOINTS)} lengths, all above 0 except that of the root"

@@ -265,7 +265,7 @@ ADVICE = {
 
 
 def _short(fact: object, other: object) -> str:
-    """A fact in words; of names, the first three that ``other`` has not in their places."""
+    """A fact in words; for names, the first three that differ from ``other``."""
     if isinstance(fact, list) and isinstance(other, list):
         names, others = _names(fact), _names(other)
         pairs = zip_longest(names, others)

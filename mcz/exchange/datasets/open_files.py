@@ -101,9 +101,9 @@ def recipe_of(names: str | Iterable[str], *facts: Any) -> Recipe:
 
 
 class OpenFiles:
-    """Files by target, opened when they are needed; ``given`` are open already and stay so.
+    """Files by target, opened on demand; ``files`` are open already and stay so.
 
-    ``runs_bytes`` bounds what all of them keep of decoded frames. Threads may share it.
+    ``runs_bytes`` limits their decoded frames in memory. Threads may share it.
     """
 
     def __init__(self, files: Mapping[str, File], runs_bytes: int, n_targets: int) -> None:
@@ -230,7 +230,7 @@ def _or_none(values: Floats | None, n_frames: int) -> Floats:
 
 
 def _joint_values(clip: Clip, subject: Subject, frames: tuple[int, int]) -> Floats:
-    """All channels, of which those that no field needs may hold anything."""
+    """All channels; those that no field needs are undefined."""
     check_poses(clip.name, clip.signals[0])
     skeleton, columns = subject.skeleton, subject.read_columns
     if len(columns) == skeleton.n_channels:

@@ -37,7 +37,7 @@ class EpochSampler(Generic[Item]):
         self.set_epoch(0)
 
     def set_epoch(self, epoch: int) -> None:
-        """Make ``epoch`` the next one, of a run that is continued or one of several processes."""
+        """Make ``epoch`` the next one, to continue a run or in one of several processes."""
         self.epoch = EPOCH(epoch)
 
     def __iter__(self) -> Iterator[Item]:

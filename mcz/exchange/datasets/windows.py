@@ -199,21 +199,21 @@ class Dataset:
         for name in self._signed:
             for window in out[name]:
                 window[:] = continuous_signs(np.asarray(window, np.float64))
-        return self._scaled(out)
+        return self._normalize(out)
 
     def _arrays(self, member: Member, start: int, stop: int) -> dict[str, Reals]:
         parts = self._blocks.parts(member, start, stop)
         arrays = {name: np.concatenate(each) for name, each in parts.items()}
         for name in self._signed:
             arrays[name][:] = continuous_signs(np.asarray(arrays[name], np.float64))
-        return self._scaled(arrays)
+        return self._normalize(arrays)
 
     @property
     def _signed(self) -> list[str]:
         """Quaternions: a window gives them the signs that keep them together."""
         return [field.name for field in self._settings.recipe.fields if field.signed]
 
-    def _scaled(self, arrays: dict[str, Reals]) -> dict[str, Reals]:
+    def _normalize(self, arrays: dict[str, Reals]) -> dict[str, Reals]:
         if self._scales is None:
             return arrays
         return {name: self._scales[name].normalize(array) for name, array in arrays.items()}

@@ -70,7 +70,7 @@ class Growth:
 
 
 @contextmanager
-def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
+def append_at_end(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
     """Append the output of the block after the last valid FOOT, over any truncated part.
 
     Where intact clips, skeletons or attachments follow that FOOT, ``salvage`` keeps them and
@@ -179,7 +179,7 @@ def _whole_until(source: ByteSource, start: int) -> int:
 
 
 def _is_last_part(source: ByteSource, chunk: Chunk) -> bool:
-    """Return True if ``chunk`` ends an item: of an attachment only the last part does."""
+    """Return True if ``chunk`` ends an item, such as the last part of an attachment."""
     if chunk.type != ChunkType.ATTA:
         return True
     fields = parse(payloads.Atta, read_payload(source, chunk, chunk.size), chunk.label)
@@ -213,7 +213,7 @@ def add_recovery(
     target: str | os.PathLike[str], redundancy: float, progress: Step | None = None
 ) -> list[Protection]:
     """Append recovery data for unprotected bytes; returns all of the file, in file order."""
-    with growing(Path(target), salvage=False, force=False) as growth:
+    with append_at_end(Path(target), salvage=False, force=False) as growth:
         protected = [protection_of(shape) for shape in protected_shapes(growth.container)]
         start, end = protected[-1].stop if protected else 0, growth.container.directory.end
         if start < end:
@@ -226,7 +226,9 @@ def protect_written(stream: BinaryIO, redundancy: float, progress: Step | None =
     """Write recovery data after the file in ``stream``, before that gets its name."""
     stream.flush()
     container = Container(ByteSource(stream))
-    with tempfile.SpooledTemporaryFile(IN_MEMORY) as added:  # the stream is read meanwhile
+    with tempfile.SpooledTemporaryFile(
+        IN_MEMORY
+    ) as added:  # the stream is read while it is written
         shape = write_recovery(container, cast(BinaryIO, added), 0, redundancy, progress)
         added.seek(0)
         stream.seek(0, os.SEEK_END)

@@ -15,7 +15,7 @@ from mcz.container.limits import profile_named
 from mcz.container.metadata import SETTABLE, Record
 from mcz.errors import MczError, OptionError, SourceError, remark_of
 from mcz.files.editing import Outcome, Report
-from mcz.files.editing.appending import growing, redundancy_of, still_protect
+from mcz.files.editing.appending import append_at_end, redundancy_of, still_protect
 from mcz.files.editing.folders import (
     dropped_facts,
     files_below,
@@ -204,8 +204,8 @@ def append(
     with (
         limit_threads(threads),
         limit_jobs(jobs),
-        superseding(Path(target), named if replace else ()) as grown,
-        growing(grown, salvage=salvage, force=force) as growth,
+        replace_older(Path(target), named if replace else ()) as grown,
+        append_at_end(grown, salvage=salvage, force=force) as growth,
     ):
         container = growth.container
         paths, content = stored_files(container)
@@ -308,7 +308,7 @@ Named = Sequence[tuple[Path, str]]  # files, each with its path in the archive
 
 
 @contextmanager
-def superseding(target: Path, files: Named) -> Iterator[Path]:
+def replace_older(target: Path, files: Named) -> Iterator[Path]:
     """The path of a file to append ``files`` to: a copy, if it must replace older contents.
 
     The copy lacks these, and takes the place of ``target`` when the block succeeds. Metadata of a

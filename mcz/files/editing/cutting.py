@@ -124,7 +124,7 @@ def plan_cut(
         if mixed is not None and is_recoded:
             return replace(cut, is_recoded=True)
         if mixed is not None:
-            raise coded_together(clip, *mixed, "cut out: its channels are coded")
+            raise shared_group_error(clip, *mixed, "cut out: its channels are coded")
     signals = list(map(partial(_plan_signal, cut), clip.signals, groups))
     if is_recoded and any(part.skip or part.spare for part in signals):
         return replace(cut, is_recoded=True)
@@ -161,7 +161,7 @@ def groups_of(
     return tuple(groups), mixed
 
 
-def coded_together(clip: Clip, joint: int, other: int, text: str) -> OptionError:
+def shared_group_error(clip: Clip, joint: int, other: int, text: str) -> OptionError:
     """The error for a joint that shares a group with another, and the way out."""
     names, codec = clip.skeleton.addresses(), clip.signals[0].codec
     return OptionError(

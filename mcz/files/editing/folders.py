@@ -47,7 +47,7 @@ def _size_of(part: str) -> int:
     return len(part.encode("utf-8", "surrogatepass"))
 
 
-def folded(name: str) -> str:
+def fold_name(name: str) -> str:
     """Fold a name as disks that ignore case or accents do."""
     if name.isascii():
         return name.lower()
@@ -69,7 +69,7 @@ def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[st
                 notes.setdefault(name, f"{who} the name {part!r}: {fault}")
         path = name
         while path:
-            other = originals.setdefault(folded(path), path)
+            other = originals.setdefault(fold_name(path), path)
             if other != path:
                 if is_asked:
                     text = f"many disks take {path!r} for the same name as {other!r}"
@@ -82,7 +82,7 @@ def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[st
 class PortableNames:
     """Gives paths names that are valid on every system, also next to each other.
 
-    ``change`` makes such a name of a part of a path; ``taken`` names are never given.
+    ``change`` makes such a name from a part of a path; ``taken`` names are never used.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class PortableNames:
     ) -> None:
         self._change = _portable if change is None else change
         self._given: dict[str, str] = {}  # parts of a path, joined by "/" -> their new name
-        self._taken = set(map(folded, taken))
+        self._taken = set(map(fold_name, taken))
 
     def __call__(self, path: str) -> str:
         """The path, or one like it: the same for the same folder, another for another file."""
@@ -103,13 +103,13 @@ class PortableNames:
     def _free(self, folder: str, part: str) -> str:
         stem, dot, suffix = part.rpartition(".") if "." in part[1:] else (part, "", "")
         name, number = part, 1
-        while folded(folder + name) in self._taken:
+        while fold_name(folder + name) in self._taken:
             number += 1
             end = f"~{number}{dot}{suffix}"
             while stem and _size_of(stem + end) > LONGEST:
                 stem = stem[:-1]
             name = stem + end
-        self._taken.add(folded(folder + name))
+        self._taken.add(fold_name(folder + name))
         return folder + name
 
 
@@ -317,7 +317,7 @@ def size_of(path: Path) -> int:
 def find_sources(
     sources: Sequence[str | os.PathLike[str]], root: str | os.PathLike[str] | None, target: Target
 ) -> tuple[list[tuple[Path, str]], list[Outcome]]:
-    """The files that ``sources`` name, each with its name in an archive; and what is left out.
+    """The files that ``sources`` name, with their names in an archive; and the files left out.
 
     A folder stands for the motion files below it, under their paths relative to it. ``root``: all
     names are relative to it; raises OptionError for a file outside of it.

@@ -43,7 +43,7 @@ from mcz.files.editing.rewriting import (
     writer_like,
 )
 from mcz.files.editing.unpacking import Content
-from mcz.files.jobs import DEFAULT_JOBS, Answer, answers, only_own, useful_jobs
+from mcz.files.jobs import DEFAULT_JOBS, Answer, answers, has_only_builtins, useful_jobs
 from mcz.files.reading.clips import list_some
 from mcz.files.reading.file import File, open
 from mcz.files.writing.atomic import WriteTransaction, check_name, clip_name, replacing_file
@@ -67,7 +67,7 @@ def merge(
 ) -> Report:
     """Put the contents of several MCZ files into one, clips in the order of the files.
 
-    A name that two of them have, or a path that both restore, is refused. ``skip_identical``: a
+    A name that two of them have, or a path that both restore, is refused. ``skip_identical``: an
     item with the same content in both is copied once. ``rename``: the later one is put below the
     name of its file, "walk" of day2.mcz becomes "day2/walk", and so does its source. Equal files of
     skeletons under one name are always copied once. Raises OptionError, which names the duplicates;
@@ -208,7 +208,7 @@ class Merger:
 
 
 def _content(file: File, item: Item) -> Callable[[], object]:
-    """A finder of the content of an item, equal for two that can replace each other."""
+    """A function that returns the content of an item, equal for interchangeable items."""
     kind, name = item
     if kind == ALIAS:
         return _alias_content(file, name)
@@ -366,7 +366,7 @@ def encode_ahead(
 ) -> Iterator[Iterator[SourceEncoder]]:
     """The entries in order, encoded ahead by other processes if worthwhile."""
     jobs = useful_jobs(len(entries), sum(size_of(entry.path) for entry in entries))
-    if jobs == DEFAULT_JOBS or not only_own():
+    if jobs == DEFAULT_JOBS or not has_only_builtins():
         yield iter(entries)
         return
     requests, profile = request_parts(entries, transaction, content), transaction.writer.profile

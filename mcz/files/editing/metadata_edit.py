@@ -22,7 +22,7 @@ from mcz.container.metadata import (
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, OptionError, reason_of
 from mcz.files.editing import Outcome, Report
-from mcz.files.editing.appending import growing, redundancy_of, still_protect
+from mcz.files.editing.appending import append_at_end, redundancy_of, still_protect
 from mcz.files.editing.rewriting import CLIP, Change, plan_whole, rewriting
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import Where, list_some, names_of
@@ -60,7 +60,7 @@ def set_metadata(
         for key, value in entries.items():
             check_pair(key, value)
     report = Report()
-    with growing(Path(target), salvage=False, force=force) as growth:
+    with append_at_end(Path(target), salvage=False, force=force) as growth:
         file = File(growth.container)
         records = [_changes_record(file, name, entries) for name, entries in changes.items()]
         records = [record for record in records if record.entries or record.removed]

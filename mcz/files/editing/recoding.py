@@ -19,9 +19,9 @@ from mcz.files.editing.cutting import (
     WITHOUT_CHANNELS,
     ClipCut,
     add_note,
-    coded_together,
     groups_of,
     joint_of_column,
+    shared_group_error,
 )
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.signal_info import SignalInfo
@@ -103,7 +103,7 @@ def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool)
 
 @dataclass(frozen=True, slots=True)
 class Edited:
-    """A decoded clip, one joint of which has other values; ``given`` are the requested ones."""
+    """A decoded clip with other values for one joint; ``given`` are the requested ones."""
 
     joint: int
     motion: Motion
@@ -145,7 +145,7 @@ def _own_groups(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ..
     groups, mixed = groups_of(clip, (_check_editable(clip, joint),))
     if mixed is not None:
         text = f"replaced alone: codec {info.codec.name} codes its channels"
-        raise coded_together(clip, *mixed, text)
+        raise shared_group_error(clip, *mixed, text)
     if info.codec.recode is None:
         raise OptionError(f"codec {info.codec.name} cannot re-encode a single joint")
     return groups
@@ -354,7 +354,7 @@ def settings_of(clip: Clip) -> Settings:
 
 
 def with_own_source(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
-    """The rest of ``clip`` with a source of its own values, or without one and the reason."""
+    """The rest of ``clip`` with a source made from its values, or without one and the reason."""
     motion = stating_rate(motion, clip.frame_numbers)
     if motion.source is None:
         return motion, None

@@ -57,7 +57,7 @@ SLACK = BLOCK = 1 << 20
 
 @dataclass(slots=True)
 class Recovery:
-    """Result of a recovery: bad blocks of all, and the bytes of the file that they cover.
+    """Result of a recovery: bad blocks, all blocks, and the bad bytes of the file.
 
     ``possible``: there are at most as many bad blocks as recovery blocks. ``behind``: bytes after
     the last protected one, copied unchanged.
@@ -103,7 +103,7 @@ class _RecoverySet:
 
     @property
     def distance(self) -> int:
-        """The distance of its packets from their place, of the nearest of them."""
+        """The least distance of one of its packets from its place."""
         return min(map(abs, self.shifts), default=0)
 
 
@@ -243,7 +243,7 @@ class Restorer:
             at += size
 
     def _write_lost(self, one: _RecoverySet, present: dict[int, tuple[int, ...]]) -> None:
-        """Write the bad blocks, of large ones some columns at a time."""
+        """Write the bad blocks, a part of large ones at a time."""
         shape = one.shape
         lost = [block for block in range(shape.n_blocks) if block not in present]
         rows = sorted(one.blocks)[: len(lost)]
@@ -275,7 +275,7 @@ class Restorer:
         if key != one.key:
             raise NotThatError("the recovered bytes differ from the protected ones")
         at = shape.chunk_offset
-        for data in chunk_bytes(shape, packets):  # which reads meanwhile
+        for data in chunk_bytes(shape, packets):  # this reads the file
             self.out.seek(at)
             self.out.write(data)
             at += len(data)

@@ -176,7 +176,7 @@ def _rename_change(file: File, item: Item, new: str) -> Change:
 
 
 def _refuse_equal(file: File, plan: Plan) -> None:
-    """Raise OptionError for two items that would newly have one name."""
+    """Raise OptionError if two items would get the same name."""
     names = Counter((kind, change.name or name) for (kind, name), change in plan.changes.items())
     for (kind, name), number in names.items():
         if number > 1:

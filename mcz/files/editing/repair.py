@@ -181,7 +181,7 @@ REPORTED = (
 def write_whole(file: File, stream: BinaryIO, outcome: Repair, progress: Progress | None) -> Repair:
     """Write the intact parts of ``file``, opened for salvage, to ``stream``, and read it again.
 
-    Parts with right checksums that break a rule are left out: of a clip first its ancillary chunks,
+    Parts with right checksums that break a rule are left out: first the ancillary chunks of a clip,
     then its source, then the clip. Raises FormatError if nothing is intact.
     """
     damage, degrees = [*outcome.damage, *file.damage], dict[str, int]()
@@ -234,7 +234,7 @@ def _is_foot(container: Container, at: int) -> bool:
 
 
 def _indexed_names(container: Container) -> dict[int, str]:
-    """The names, in a valid index, of the parts at each offset; "" for one that is not lost."""
+    """Names of the parts at each offset in a valid index; "" for a part that is not lost."""
     names: dict[int, str] = {}
     with suppress(FormatError):
         directory = Container(container.source).directory

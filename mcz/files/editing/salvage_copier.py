@@ -1,7 +1,7 @@
 """Copy the intact parts of a damaged file: clips, runs of frames of others, some signals.
 
-Stored bytes are copied, never encoded again. Of a clip that has lost frames, each run of frames
-that can still be decoded becomes a clip of its own. Lost values are never replaced. SPEC.md,
+Stored bytes are copied, never encoded again. Each run of frames that can still be decoded, in a
+clip that has lost some, becomes a clip of its own. Lost values are never replaced. SPEC.md,
 "Salvage" and "Cutting without re-encoding", are normative.
 """
 
@@ -244,7 +244,7 @@ class Repairer(Copier):
     def _without_source(
         self, cut: ClipCut, new: payloads.Clip, error: FormatError
     ) -> tuple[bytes, list[bytes]]:
-        """The same of a clip whose template is lost, and with it the original file."""
+        """A part of a clip whose template, and with it the original file, is lost."""
         text = f"clip {cut.clip.name!r}: its source file: {error}"
         if text not in self.repair.lost:
             self.repair.lost.append(text)

@@ -195,7 +195,7 @@ class StoredFile:
 
 
 def files_of(file: File, clips: Sequence[Clip] | None = None) -> Iterator[StoredFile]:
-    """Every file of the archive; of ``clips`` only their sources and skeletons."""
+    """All files of the archive, or only the sources and skeletons of ``clips``."""
     for clip in file if clips is None else clips:
         try:
             path = clip.source.path if clip.source is not None else ""

@@ -108,7 +108,9 @@ def begin_clip(
 
     ``head`` is HEAD, ``shared`` the chunks before the clip. Raises FormatError for a missing one.
     """
-    container = Container(ByteSource(io.BytesIO(opening(head, shared, fields) + build_foot(0, 0))))
+    container = Container(
+        ByteSource(io.BytesIO(opening_bytes(head, shared, fields) + build_foot(0, 0)))
+    )
     skeleton = container.skeleton(row.skeleton)
     rate = Fraction(row.rate_numerator, row.rate_denominator) if row.rate_numerator else None
     motion = fields.signals[0]
@@ -124,7 +126,7 @@ def begin_clip(
     return ClipState(clip, info, None if is_open else visible, len(fields.signals))
 
 
-def opening(head: bytes, shared: Shared, fields: payloads.Clip) -> bytes:
+def opening_bytes(head: bytes, shared: Shared, fields: payloads.Clip) -> bytes:
     """A file up to the clip with these ``fields``: only the chunks that it needs."""
     needed = [shared[key] for key in needed_chunks(fields) if key in shared]
     return b"".join([SIGNATURE, head, *needed])
@@ -263,7 +265,7 @@ class StrictFrames:
                 row = self.scanner.clip
                 assert row is not None
                 fields = parse(payloads.Clip, event.payload, row.clip.label)
-                before = opening(head, shared, fields)
+                before = opening_bytes(head, shared, fields)
                 clip = begin_clip(head, shared, row, fields) or _WholeClip(
                     before + event.data, row.name
                 )

@@ -73,7 +73,7 @@ def stream_encode(
     metadata: Mapping[str, str] = MappingProxyType({}),
     repeat: int | None = None,
 ) -> Iterator[bytes]:
-    """The bytes of a live clip: first what precedes the frames, then each frame as it comes.
+    """Yield the bytes of a live clip: those before the frames, then each frame as it comes.
 
     ``skeleton`` may be names instead, of markers or of their coordinates (see ``markers``).
     ``frames`` yields rows in source units, (n_channels,), NaN where invalid; a mapping among them

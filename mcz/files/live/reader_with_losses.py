@@ -272,7 +272,7 @@ class _ClipCourse:
 
 
 class Concealer:
-    """Puts frames in order; ``lost`` decides the substitute of missing ones.
+    """Puts frames in order; ``lost`` chooses the substitutes for missing ones.
 
     ``shown`` are the stored frames that the clip shows, None for all; input counts stored frames,
     output the shown ones. ``due`` is the stored frame that comes next, None as long as it is
@@ -332,15 +332,15 @@ class Concealer:
         else:
             for _ in range(count):
                 self.due += 1
-                yield self._held(self.due - 1)
+                yield self._substitute(self.due - 1)
 
     def end(self) -> Iterator[LiveFrame]:
         """Note that no frame follows the missing ones."""
         owed, self._owed = self._owed, 0
         for number in range((self.due or 0) - owed, self.due or 0):
-            yield self._held(number)
+            yield self._substitute(number)
 
-    def _held(self, number: int) -> LiveFrame:
+    def _substitute(self, number: int) -> LiveFrame:
         if self._last is None or self._lost == "missing":
             return LiveFrame(number - self._first, *self._nothing, "missing")
         return LiveFrame(number - self._first, *self._last, "concealed")  # LIVE-01

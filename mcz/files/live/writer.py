@@ -198,7 +198,7 @@ class LiveWriter:
                 raise
 
     def miss(self, n_frames: int = 1) -> None:
-        """Skip the numbers of so many frames after the last one; OptionError before the first."""
+        """Skip ``n_frames`` frame numbers after the last one; OptionError before the first."""
         self._gaps.miss(n_frames)
 
     def _push(self, row: Floats) -> Floats:
@@ -247,7 +247,7 @@ class LiveWriter:
         self._changed |= set(params)
 
     def _write(self, stream: bytes, fresh: bool, valid: Mask | None) -> None:
-        """Write one frame, each fresh one as the first of a DATA of its own."""
+        """Write one frame; a fresh one begins a DATA."""
         self.entry = None
         if fresh and self._has_data:
             self._writer.close_data()

@@ -139,7 +139,7 @@ def _bytes(clip: Clip) -> Value:
 
 
 def packet_framing(rows: Sequence[SegmentRow]) -> int:
-    """The bytes of open DATA outside of the bodies of their packets; ``rows`` in file order."""
+    """Bytes of open DATA outside of packet bodies; ``rows`` are in file order."""
     total = n_packets = end = 0
     for row in rows:
         if row.packet:

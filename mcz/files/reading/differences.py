@@ -215,7 +215,7 @@ def _single_values(motion: Motion) -> dict[str, str | int | float | None]:
 
 
 def _collections(motion: Motion) -> dict[str, dict[Any, Any]]:
-    """Things of which a motion may have several, by name or by text."""
+    """Counted facts of a motion, such as events, by name or by text."""
     parameters, recorded = _parameters(motion), recording(motion)
     arrays = arrays_of(motion.source, [signal.name for signal in motion.signals]) or ()
     platforms = () if recorded is None else recorded.platforms

@@ -1,8 +1,7 @@
 """The faults of a file: of its checksums and index alone, or of all of it, decoded.
 
-The checksums are checked in one pass at the speed of the disk, which holds a block at a time and
-continues after a fault to report all of them. SPEC.md, "Chunks", "Open DATA and packets", "INDX"
-and "FOOT", are normative.
+One pass at the speed of the disk checks all checksums, a block at a time, and reports every fault.
+SPEC.md, "Chunks", "Open DATA and packets", "INDX" and "FOOT", are normative.
 """
 
 from __future__ import annotations
@@ -151,8 +150,8 @@ class _Check:
         elif index is not None and not self._has_lost:
             try:
                 limit = index_limit(size)
-                directory = read_indexes(self._source.read, index.offset, index.size, limit)
-                faults = self._places.differences(directory_of(directory))
+                indexes = read_indexes(self._source.read, index.offset, index.size, limit)
+                faults = self._places.differences(directory_of(indexes))
             except FormatError as error:
                 faults = [str(error)]
             for text in faults:
@@ -162,7 +161,7 @@ class _Check:
 
 @dataclass(slots=True)
 class _ClipPlaces:
-    """The chunks of a clip; of its segments, which may be many, a count and a CRC-32 of places."""
+    """The chunks of a clip; its segments, which may be many, as a count and a CRC-32 of places."""
 
     clip: Chunk
     n_segments: int = 0
@@ -209,9 +208,8 @@ class _Places:
             faults.append("its copy of HEAD differs from HEAD")
         if list(directory.shared.items()) != list(self.shared.items()):
             faults.append("it lists other skeletons, models or sources than the file has")
-        if [
-            part for row in directory.attachments.values() for part in row.parts
-        ] != self.attachments:
+        parts = [part for row in directory.attachments.values() for part in row.parts]
+        if parts != self.attachments:
             faults.append("it lists other attachments than the file has")
         if self.n_aliases != len(directory.aliases):
             faults.append(

@@ -59,7 +59,7 @@ def is_source(path: str) -> bool:
 
 
 def suffixes_of(target: str) -> tuple[str, ...]:
-    """The suffixes of files of a target: of a format, or of a scene."""
+    """The suffixes of a target, a format or a scene."""
     return FORMATS[target].suffixes if target in FORMATS else (f".{target}",)
 
 
@@ -347,7 +347,7 @@ def _open_source(source: ByteSource, options: Params) -> File:
                     raise
                 end = error.last_foot
                 break
-            if size == source.size:  # no process is appending, or was meanwhile
+            if size == source.size:  # no process has appended since
                 raise
             source = source.up_to(size)
     file = file_of(Container(source.up_to(end), **options))

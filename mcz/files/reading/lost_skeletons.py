@@ -206,7 +206,7 @@ def _bases(container: Container) -> Iterator[Skeleton | None]:
 
 
 def _offset_ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:
-    """The joints, whose positions add to the offset or replace it, of roots and of others."""
+    """Yield the joints with each choice of whether positions add to offsets or replace them."""
     has_position = [any(c.kind in POSITION_KINDS for c in joint.channels) for joint in joints]
     yield joints
     for of_roots, of_others in product((True, False), repeat=2):

@@ -71,8 +71,8 @@ def live_filter(skeleton: Skeleton, rate: Fraction | None, name: str = "live") -
 class FilteredClip(Clip):
     """``clip`` with the post filter; ``rate`` replaces its frame rate. Raises as ``post_filter``.
 
-    Of the motion all is filtered, then a part is cut out. Its source has filtered positions, in the
-    style of the original file.
+    The whole motion is filtered, then cut. Its source has filtered positions, in the style of the
+    original file.
     """
 
     def __init__(self, clip: Clip, rate: Fraction | None = None) -> None:
@@ -138,7 +138,7 @@ class FilteredClip(Clip):
 
 
 def _check_markers(name: str, skeleton: Skeleton, has_channels: bool) -> None:
-    """Raise MotionError for a motion of other joints than markers, or with channels of its own."""
+    """Raise MotionError unless all joints are markers without further channels."""
     if has_channels or point_set(skeleton) != "markers":
         raise MotionError(
             f"the post filter works on markers, and motion {name!r} has joints; convert it "

@@ -174,10 +174,12 @@ def choose_skeleton(
 
 
 def _check_asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> SkeletonChoice:
-    """``skeleton``; raises SourceError if it has none of the bones but the root."""
+    """Return ``skeleton``; raises SourceError if it shares only the root with the file."""
     match = match_bones(skeleton, counts)
     if match.is_foreign:
-        raise SourceError(f"{label} has none of its bones: {_listed(match.lacking)}", path=path)
+        raise SourceError(
+            f"{label} has none of its bones: {_first_bones(match.lacking)}", path=path
+        )
     return SkeletonChoice(skeleton, "")
 
 
@@ -205,9 +207,9 @@ class _Candidate:
         if self.fault:
             return f"{path} (which cannot be read)"
         if self.match.lacking:
-            return f"{path} (which lacks {_listed(self.match.lacking)})"
+            return f"{path} (which lacks {_first_bones(self.match.lacking)})"
         if self.match.differing:
-            return f"{path} (other dofs of {_listed(self.match.differing)})"
+            return f"{path} (other dofs of {_first_bones(self.match.differing)})"
         return f"{path} (whose bones fit)"
 
 
@@ -258,7 +260,7 @@ def _only(path: Path, fitting: list[_Candidate], all_: list[_Candidate]) -> Skel
     remark = "" if name_of else f"its skeleton is {asf}, the only one around whose bones fit"
     if first.match.differing:
         remark = remark or f"its skeleton is {asf}"
-        remark += f"; the dofs of {_listed(first.match.differing)} are not those of the file"
+        remark += f"; the dofs of {_first_bones(first.match.differing)} are not those of the file"
     return SkeletonChoice(first.skeleton, how, remark, asf)
 
 
@@ -271,12 +273,14 @@ def _with_misfits(
     label = _printable(str(chosen.path or chosen.skeleton.name or "the skeleton"))
     if match.lacking and not is_named:
         name = label if chosen.path is None else _printable(_seen_from(path.parent, chosen.path))
-        raise SourceError(f"{name} lacks {_listed(match.lacking)}", path=path, hint=Hint.SKELETON)
+        raise SourceError(
+            f"{name} lacks {_first_bones(match.lacking)}", path=path, hint=Hint.SKELETON
+        )
     remark = chosen.remark
     if match.lacking:
-        remark = f"{label} lacks {_listed(match.lacking)}; they are scalars without kinematics"
+        remark = f"{label} lacks {_first_bones(match.lacking)}; they are scalars without kinematics"
     elif match.differing and not remark:
-        text = f"the dofs of {_listed(match.differing)} are not those of the file"
+        text = f"the dofs of {_first_bones(match.differing)} are not those of the file"
         remark = f"its skeleton is {label}; {text}"
     return replace(chosen, remark=remark)
 
@@ -290,7 +294,9 @@ class AmbiguousError(SourceError):
 def _ambiguous_error(path: Path, candidates: Sequence[_Candidate], text: str) -> AmbiguousError:
     riddle = _riddle_error(path, candidates, text)
     error = AmbiguousError(riddle.message, **riddle.fields)
-    error.reason = f"{text}: {_listed([_printable(one.candidate.path.name) for one in candidates])}"
+    error.reason = (
+        f"{text}: {_first_bones([_printable(one.candidate.path.name) for one in candidates])}"
+    )
     return error
 
 
@@ -306,7 +312,7 @@ def _seen_from(folder: Path, path: Path) -> str:
         return str(path)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _first_bones(names: Sequence[str]) -> str:
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return " ".join(names[:3]) + more
 

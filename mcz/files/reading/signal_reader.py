@@ -79,7 +79,7 @@ class SignalReader:
             self._grids = tuple(layout.grids[c] for c in self._columns)
 
     def signal(self, start: int, stop: int) -> Signal:
-        """The same of all groups as a Signal, decoded once."""
+        """All groups as a Signal, decoded once."""
         info = self.info
         exceptions, changes = self.exceptions(start, stop)
         grids = (*info.grids, *(grid for _, _, grid in changes))
@@ -134,7 +134,7 @@ class SignalReader:
         return slice((start - base) * per_frame, (stop - base) * per_frame)
 
     def blocks(self, start: int, stop: int, out: Values | None = None) -> Iterator[Block]:
-        """The same block by block; values may be in ``out``, of all rows, already."""
+        """Yield the values block by block; ``out`` may have those of all rows already."""
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)
             self._decode(spans, start, stop)
@@ -169,7 +169,7 @@ class SignalReader:
             yield from self.blocks(at, stop, out[self._rows(start, at, stop)])
 
     def _run(self, frame: int) -> tuple[int, int] | None:
-        """The shown frames that depend on each other; None if they are too many to keep."""
+        """Decode shown frames that depend on each other; None if they are too many to cache."""
         info, rows = self.info, self.info.rows
         per_frame = math.prod(self._shape(0, 1)) * 8
         most = min(MOST_OF_ONE, self.container.max_decoded) // max(per_frame, 1)
@@ -189,7 +189,7 @@ class SignalReader:
         return (start, stop) if stop - start <= most else None
 
     def _cut(self, run: tuple[int, int], start: int, stop: int) -> Iterator[Block]:
-        """Frames of a run, which is decoded whole if not cached, where that is worthwhile."""
+        """Frames of a run; if not cached, the whole run is decoded where that pays."""
         rows = self.info.covering(run[0], run[0] + 1)
         key = self.info.rows[rows[0]].offset, self.groups, self.resolution
         decoded = self.container.runs.get(key)

@@ -248,10 +248,10 @@ def layout(file: File) -> list[tuple[int, int, str]]:
     for at, segment in tables.items():
         if segment.in_packet:
             parts += _segment_parts(at, segment)
-    return _filled(sorted(parts), file.size)
+    return _fill_gaps(sorted(parts), file.size)
 
 
-def _filled(parts: list[tuple[int, int, str]], size: int) -> list[tuple[int, int, str]]:
+def _fill_gaps(parts: list[tuple[int, int, str]], size: int) -> list[tuple[int, int, str]]:
     filled, at = [], 0
     for offset, length, text in [*parts, (size, 0, "")]:
         if offset > at:

@@ -1,6 +1,6 @@
 """Source files: read from disk, with facts from the caller, and those that clips store.
 
-Of a stored one: its facts, its parts joined, and the meaning of its numbers.
+For a stored one: its facts, its joined parts, and the meaning of its numbers.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
 
 def load(path: Path) -> tuple[Format, bytes]:
     """The format of a source file, see ``format_of``, and its bytes; raises SourceError."""
-    if not has_known_suffix(path):  # refused, whatever its content
+    if not has_known_suffix(path):  # refused with any content
         format_of(path, _start_of(path))
     data = read_bytes(path)
     return format_of(path, data), data
@@ -190,7 +190,7 @@ class SourceOptions:
             motion = replace(motion, skeleton=with_axes(motion.skeleton, *self.axes))
         return motion
 
-    def completing(self, motion: Motion) -> Motion:
+    def complete(self, motion: Motion) -> Motion:
         """``motion`` with the facts that it lacks."""
         skeleton = motion.skeleton
         unknown = replace(
@@ -230,7 +230,7 @@ class SourceInfo:
 
     @property
     def suffixes(self) -> tuple[str, ...]:
-        """The suffixes, in lower case, of its format, and that of its name."""
+        """The suffixes of its format and that of its name, in lower case."""
         own = PurePosixPath(self.path).suffix.lower()
         return (*FORMATS[self.format].suffixes, *([own] if own else []))
 

@@ -285,12 +285,14 @@ class StoredClip:
 
 def with_names(entries: Mapping[str, str], skeleton: Skeleton) -> dict[str, str]:
     """The entries of a stored record with names of joints; an index beyond all stays."""
-    return _translated(entries, _name_of(skeleton.addresses()), _name_of(point_names(skeleton)))
+    return _translate_keys(entries, _name_of(skeleton.addresses()), _name_of(point_names(skeleton)))
 
 
 def with_indices(entries: Mapping[str, str], skeleton: Skeleton) -> dict[str, str]:
     """The entries as a file has them; joints that ``skeleton`` lacks are left out."""
-    return _translated(entries, _index_of(skeleton.addresses()), _index_of(point_names(skeleton)))
+    return _translate_keys(
+        entries, _index_of(skeleton.addresses()), _index_of(point_names(skeleton))
+    )
 
 
 def _name_of(names: Sequence[str]) -> Lookup:
@@ -310,7 +312,7 @@ def _index_of(names: Sequence[str]) -> Lookup:
     return look_up
 
 
-def _translated(entries: Mapping[str, str], joint: Lookup, point: Lookup) -> dict[str, str]:
+def _translate_keys(entries: Mapping[str, str], joint: Lookup, point: Lookup) -> dict[str, str]:
     translated = {}
     for key, value in entries.items():
         before = _BEFORE.match(key)

@@ -1,6 +1,6 @@
 """Writing a file that gets its name only when it is complete, and never replaces an input.
 
-A ``WriteTransaction`` writes one in steps, of which a failed one leaves no trace.
+A ``WriteTransaction`` writes in steps; a failed step leaves no trace.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ def _clear_leftovers(folder: Path, prefix: str) -> None:
 
 
 def _give_name(name: str, path: Path, force: bool) -> None:
-    """Rename ``name`` to ``path``; without ``force`` never over a file that appeared meanwhile."""
+    """Rename ``name`` to ``path``; without ``force`` never over a file that has appeared since."""
     try:
         if not force and _link(name, path):
             os.unlink(name)

@@ -61,7 +61,7 @@ Amend = Callable[[dict[str, str], Sequence[Values]], dict[str, str]]
 
 @dataclass(frozen=True, slots=True)
 class Decoded:
-    """A signal as a reader has it: of a lossless codec ``values`` are the given ones."""
+    """A signal as a reader decodes it; a lossless codec gives the original ``values``."""
 
     values: Values
     sha256: bytes

@@ -203,7 +203,7 @@ def rate_notes(stated: Fraction | None, options: SourceOptions) -> Iterator[str]
 
 
 def _refuse_early(source_format: Format, data: bytes, profile: Profile) -> None:
-    """Raise LimitError for more joints than the profile has, before any of them is read."""
+    """Raise LimitError for more joints than the profile allows, before any is read."""
     if source_format.has_more_joints and source_format.has_more_joints(data, profile.joints):
         raise LimitError(
             f"there are more joints than the limit of {profile.joints}",

@@ -92,13 +92,13 @@ def stored_with_base(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[S
 
 
 def under_its_path(skeleton: Skeleton) -> StoredSkeleton:
-    """``skeleton``, stored with the path of its own file if it has one."""
+    """``skeleton`` with the path of its own file, if it has one."""
     path = skeleton.source.path if skeleton.source is not None else ""
     return StoredSkeleton(skeleton, path=path)
 
 
 def wants_positions(codec: Codec, options: Params, skeleton: Skeleton) -> bool:
-    """True if a codec takes the positions of points instead of the channels of a clip."""
+    """Return True if a codec codes positions of points instead of channels."""
     if not codec.positions or options.get("domain") == "channels" or not skeleton.joints:
         return False
     return point_set(skeleton) != "markers"

@@ -30,7 +30,7 @@ from mcz.sources import recording_of, with_analog_scales
 EXACT_ROLES = {"times": "they order the frames", "residuals": "they say which points are valid"}
 FLOATS = (GridKind.BINARY32, GridKind.VAX_F)
 MOST_MULTIPLES = 2**19  # of a step in a number; beyond, fast may find no unit
-SHORT_BITS = 8  # of a unit of floats, few of whose multiples are rounded then
+SHORT_BITS = 8  # bits of a unit of floats: few of its multiples are rounded then
 TRIALS = 10
 GOOD_ENOUGH = 0.97  # of a requested mean error: near enough
 

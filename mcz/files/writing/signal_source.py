@@ -25,7 +25,7 @@ from mcz.model.types import Params
 from mcz.sources import recording_of
 
 KEPT_BLOCKS = 8
-MAX_INTEGER = 2**53  # greatest integer up to which a binary64 holds all exactly
+MAX_INTEGER = 2**53  # binary64 holds all integers up to this exactly
 Block = tuple[NDArray[np.int64], Signal]
 
 
@@ -87,7 +87,9 @@ class MemorySource:
         """
         if (start, stop) not in self._settled:
             signal = self.signal.cut(start, stop)
-            ordinals, settled = settle(signal if self.is_lossless else _freed(signal, self.exact))
+            ordinals, settled = settle(
+                signal if self.is_lossless else _free_grids(signal, self.exact)
+            )
             if settled.exceptions is not signal.exceptions:
                 signal = replace(signal, exceptions=settled.exceptions)
             self._settled[start, stop] = ordinals, signal
@@ -138,7 +140,7 @@ def _with_exceptions_of(signal: Signal, channels: Sequence[int]) -> Signal:
     return replace(signal, exceptions=Exceptions(old.rows[rows], old.channels[rows], texts))
 
 
-def _freed(signal: Signal, channels: Sequence[int]) -> Signal:
+def _free_grids(signal: Signal, channels: Sequence[int]) -> Signal:
     free = Grid(GridKind.BINARY64)
     return replace(
         signal,

@@ -100,7 +100,7 @@ class Trials:
 
         Of positions in cm, unless ``target`` is one of channels.
         """
-        unit, decoded = self.motion.skeleton.unit_cm, self._decoded(self.alone, params)
+        unit, decoded = self.motion.skeleton.unit_cm, self._decode_trial(self.alone, params)
         if target.weights is not None:
             errors = self._weighed_errors(target.weights, decoded)
             known = np.where(np.isfinite(errors), errors, 0.0).reshape(self.motion.n_frames, -1)
@@ -122,7 +122,7 @@ class Trials:
 
         0 for one without points.
         """
-        decoded = self._decoded(self.alone, params)
+        decoded = self._decode_trial(self.alone, params)
         figures = compare(self.alone, decoded, virtual_markers=False, shell_cm=None).by_joint
         unit = self.motion.skeleton.unit_cm
         return np.array([(figure.mean_position_error or 0.0) * (unit or 0.0) for figure in figures])
@@ -148,7 +148,7 @@ class Trials:
             self.kept.setdefault(LIKE, trial.header)
         return trial
 
-    def _decoded(self, motion: Motion, params: Params) -> Motion:
+    def _decode_trial(self, motion: Motion, params: Params) -> Motion:
         """``motion`` as a reader has it."""
         trial = self._write_trial(motion, params)
         if any(signal.scaling is not None for signal in motion.signals):  # of stored numbers
@@ -157,13 +157,13 @@ class Trials:
 
     def _measure(self, motion: Motion, target: Target, params: Params) -> float:
         if target.weights is not None:
-            errors = self._weighed_errors(target.weights, self._decoded(motion, params))
+            errors = self._weighed_errors(target.weights, self._decode_trial(motion, params))
             n = np.isfinite(errors).sum(axis=0) if target.name == MEAN_ERROR else 1
             known = np.where(np.isfinite(errors), errors, 0.0)
             sums = known.sum(axis=0) / np.maximum(n, 1)
             return float((sums if target.name == MEAN_ERROR else known).max(initial=0.0))
         if not target.falls:
-            decoded = self._decoded(motion, params)
+            decoded = self._decode_trial(motion, params)
             figures = compare(motion, decoded, virtual_markers=False, shell_cm=None)
             return _error(target, figures)
         sizes = clip_sizes(*_open(self._write_trial(motion, params), motion))

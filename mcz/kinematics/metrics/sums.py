@@ -84,7 +84,7 @@ class ChannelErrors:
 
 
 class Distances:
-    """Mean and greatest of distances in ``n`` columns, of each column and of all."""
+    """Mean and greatest distance of each of ``n`` columns and of all."""
 
     def __init__(self, n: int) -> None:
         self.counts = np.zeros(n, np.int64)
@@ -124,7 +124,7 @@ class Distances:
         return int(self.rows[column]), column
 
     def by_group(self, sizes: Sequence[int]) -> Iterator[tuple[Number, Number, int | None]]:
-        """Mean, greatest and the row of the greatest of groups of columns, in order."""
+        """Mean, greatest and the row of the greatest for each group of columns, in order."""
         counts, totals = self.counts.tolist(), self.totals.tolist()
         places = list(zip(self.greatest_by_column.tolist(), (-self.rows).tolist(), strict=True))
         first = 0
@@ -222,7 +222,7 @@ def squared_norms(vectors: Floats) -> Floats:
 
 
 class RunningFigures:
-    """The errors of a quality record, frame by frame: of values and, of markers, of positions."""
+    """Errors of a quality record, frame by frame: of values and of marker positions."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton

@@ -2,7 +2,7 @@
 
 One convention throughout: rotations are active and turn column vectors, a joint's local rotation is
 W_parent^-1 W (W: its rotation in the world), and in the rest pose every rotation is the identity.
-Functions take a Motion or a Clip, of which only the needed part is decoded.
+Functions take a Motion or a Clip, and decode only the needed part of a Clip.
 """
 
 from __future__ import annotations

@@ -178,7 +178,7 @@ def _from_6d(flat: Floats) -> Floats:
 def continuous_signs(quaternions: Floats) -> Floats:
     """Quaternions (n_frames, n, 4), w first, with the signs that keep neighbors near each other.
 
-    w >= 0 in the first frame and in each after a break in time.
+    w >= 0 in the first frame and after each break in time.
     """
     if not len(quaternions):
         return quaternions
@@ -199,7 +199,7 @@ def continuous_signs(quaternions: Floats) -> Floats:
 
 
 def slerp(first: Floats, second: Floats, share: Floats) -> Floats:
-    """Matrices (n, 3, 3) a ``share``, (n,), of the shortest way from ``first`` to ``second``."""
+    """Matrices (n, 3, 3) at a ``share``, (n,), of the shortest way from ``first`` to ``second``."""
     out = np.full(first.shape, np.nan)
     known = np.isfinite(first).all(axis=(1, 2)) & np.isfinite(second).all(axis=(1, 2))
     if known.any():
@@ -260,7 +260,7 @@ def rotations(
 
 Quaternion = tuple[int, ...]  # four columns
 
-UNIT = 2e-3  # greatest deviation of a norm from 1: of numbers with three decimals
+UNIT = 2e-3  # greatest deviation of a norm from 1, for numbers with three decimals
 SIZE = 4
 _NAMED = re.compile(r"(?i)quat|(^|[^a-z])q(_?[wxyz0-3])?($|[^a-z0-9])")
 HINT = "; components=True interpolates each column by itself"
@@ -327,7 +327,7 @@ def _describe_columns(names: Sequence[str | None], at: int) -> str:
 
 
 def slerp_quaternions(first: Floats, last: Floats, share: Floats) -> Floats:
-    """The quaternions (n, 4) a ``share``, (n,), of the shortest way from the first to the last."""
+    """Quaternions (n, 4) at a ``share``, (n,), of the shortest way from the first to the last."""
     with np.errstate(invalid="ignore", divide="ignore"):
         cosine = (first * last).sum(axis=1, keepdims=True)
         last = np.where(cosine < 0, -last, last)

@@ -302,7 +302,7 @@ def _matrices(chain: Chain, link: Link, old: Floats) -> Floats:
 
 
 def _angles(turns: Floats, order: str, guess: Floats, full: float) -> Floats:
-    """The Euler angles of matrices (n, 3, 3), of all solutions the nearest to ``guess``."""
+    """The Euler angles of matrices (n, 3, 3) that are nearest to ``guess``."""
     angles = euler_angles(np.moveaxis(turns, 0, 2), order) * (full / (2 * np.pi))
     half = full / 2
     other = np.stack([angles[:, 0] + half, half - angles[:, 1], angles[:, 2] + half], axis=1)

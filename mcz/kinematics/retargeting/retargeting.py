@@ -140,13 +140,13 @@ class _Retargeted:
             )
             target = multiply_matrices(missed[above], turn)
             turned = set_local_turns(self.ours, joint, target, self.columns)
-            missed[joint] = _known(multiply_matrices(inverse_turns(turned), target))
+            missed[joint] = _fill_unknown(multiply_matrices(inverse_turns(turned), target))
         self.travel.set(self.columns, self.rest)
         return np.ascontiguousarray(self.columns.T)
 
 
-def _known(turn: Floats) -> Floats:
-    """The same, the identity if unknown: joints below are known independently."""
+def _fill_unknown(turn: Floats) -> Floats:
+    """Rotations with the identity if unknown: joints below are known independently."""
     known = finite_frames(turn)
     return turn if known.all() else np.where(known, turn, IDENTITY)
 

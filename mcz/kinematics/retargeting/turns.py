@@ -167,9 +167,9 @@ def _angle(turn: Floats | None) -> float:
 
 
 def usual_alike(target: Skeleton, source: Skeleton, pairs: Mapping[int, int]) -> list[str]:
-    """The limbs of a usual skeleton, if one of them rests otherwise than the source's.
+    """The limbs of a usual skeleton, if one rests in another direction than the source's.
 
-    All of them, since joints that are not named turn along with the joint above. Warns with
+    All limbs count, since joints that are not named turn with the joint above. Warns with
     SkeletonWarning for other skeletons whose bones rest otherwise.
     """
     names, others = target.joint_names, source.joint_names

@@ -32,7 +32,7 @@ from mcz.model.numbers.token_kernels import Survey
 from mcz.model.numbers.tokens import Tokens
 from mcz.model.types import Bools, Floats, Ints
 
-EXHAUSTIVE_TOKENS = 2**14  # up to so many tokens, all candidates are tried in order
+EXHAUSTIVE_TOKENS = 2**14  # for at most so many tokens all candidates are tried in order
 _SAMPLE = 4096  # tokens of the sample that suggests candidates; all tokens are counted
 # from one sampled token to the next: a prime, so that all columns are sampled
 _STEP = 2_654_435_761
@@ -110,7 +110,7 @@ def _ends(histogram: Sequence[int]) -> list[int]:
 
 
 def _styles(counts: Sequence[int]) -> tuple[int, int, int]:
-    """Flags of the sign and the leading zero, of integral numbers, of the exponent: majorities."""
+    """Flags of the most common sign, leading zero, integral form and exponent."""
     kinds = token_kernels
     sign = GridFlag.PLUS if counts[kinds.SIGNED] > counts[kinds.UNSIGNED] else 0
     if counts[kinds.NO_ZERO] > counts[kinds.BARE_INTEGER]:
@@ -146,7 +146,7 @@ def fit_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, B
     others.
     """
     if not (tokens.known or tokens.bad().any()):
-        tokens.values()  # several grids need them, or some of them
+        tokens.values()  # cached, since several grids need them
     preferred = []
     for grid in prefer:
         preferred.append((grid, *grid.ordinals_of_tokens(tokens)))

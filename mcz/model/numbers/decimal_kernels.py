@@ -64,13 +64,13 @@ def match(
     printed: Flags,
     allowed: int,
 ) -> int:
-    """Ordinals of the tokens that a decimal grid prints; returns the number of other tokens.
+    """Fill in ordinals of tokens that a decimal grid prints; return the number of others.
 
-    Stops after more than ``allowed`` of these.
+    Stops after more than ``allowed`` others.
 
     ``rule``: significant digits or 0, decimals, trimmed, low, high, flags, limit. With digits:
-    ``%g``, with an exponent below ``low`` and from ``high`` on. Without: so many decimals, or up to
-    so many if trimmed. Magnitudes above ``limit`` are not printed.
+    ``%g``, with an exponent below ``low`` and from ``high`` on. Without: exactly, or if trimmed at
+    most, ``decimals`` decimals. Magnitudes above ``limit`` are not printed.
     """
     digits, decimals, trim, low, high, flags, limit = rule
     refused = LONG | SPECIAL | BAD | EXTRA_ZERO | (0 if digits else EXPONENT)

@@ -148,7 +148,7 @@ _VAX_TINY = 0x00800000  # below it the exponent is 0: zero, or reserved with a m
 
 
 def general_split(magnitudes: Ints, digits: int) -> tuple[Ints, Ints]:
-    """(mantissa, power of ten) of numbers of so many digits; (0, 0) for zero."""
+    """(mantissa, power of ten) of numbers of ``digits`` digits; (0, 0) for zero."""
     block = 10 ** (digits - 1)
     power, mantissa = np.divmod(magnitudes - 1, 9 * block)
     zero = magnitudes == 0

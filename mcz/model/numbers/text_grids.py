@@ -1,8 +1,8 @@
 """Text grids: tokens to ordinals, ordinals to text. SPEC.md, "Number grids".
 
-Numbers of the PRINTED grid are numbers of one sort, printed by another rule. Its digits define the
-numbers, its style how C prints them as binary64: ``%.nf`` for n, ``%.nf`` of 17 digits and zeros
-for ``SHORT_FIXED`` + n, ``%.ng`` for ``SIGNIFICANT`` + n, ``%.ne`` for ``EXPONENT`` + n.
+A PRINTED grid prints the numbers of a base grid by another rule. Its digits name the base, its
+style is a format of C for binary64: ``%.nf`` for n, ``%.nf`` of 17 digits and zeros for
+``SHORT_FIXED`` + n, ``%.ng`` for ``SIGNIFICANT`` + n, ``%.ne`` for ``EXPONENT`` + n.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ def printed_exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
 def match_tokens(
     tokens: Tokens, kind: GridKind, digits: int, flags: int, allowed: int | None = None
 ) -> tuple[Ints, Bools, int]:
-    """(ordinals, mask of the tokens that the grid prints exactly so, count of the others).
+    """(ordinals, mask of the tokens that the grid prints exactly, count of the others).
 
-    Of TEXT grids only the shape is checked. Stops after more than ``allowed`` misses.
+    TEXT grids check only the shape. Stops after more than ``allowed`` misses.
     """
     general, low, high = printed_exponents(kind, digits)
     trim = kind != GridKind.FIXED and digits < FIXED_TEXT
@@ -77,7 +77,7 @@ def match_tokens(
 
 
 def uncertain_tokens(tokens: Tokens, kind: GridKind, digits: int, printed: Bools) -> Bools:
-    """Mask of the tokens that need an exact check; ``printed`` are those of the right shape.
+    """Mask of the tokens that need an exact check; ``printed`` marks those of the right shape.
 
     A normal number of 15 digits (6 in binary32) is its own shortest text.
     """
@@ -98,14 +98,14 @@ def too_long(tokens: Tokens) -> Bools:
 
 
 def token_ordinals32(tokens: Tokens) -> Ints:
-    """Ordinals of the binary32 nearest to tokens."""
+    """Ordinals of the binary32 numbers nearest to tokens."""
     values = tokens.values()
     magnitudes = np.minimum(binary32_magnitudes(np.abs(values)), limit(GridKind.TEXT32, 0))
     return magnitudes ^ -np.signbit(values).astype(np.int64)
 
 
 def grid_texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negative: Bools) -> Texts:
-    """Print the numbers of these magnitudes, which are already within the limit."""
+    """Print the numbers of ``magnitudes``, which are within the limit."""
     general, low, high = printed_exponents(kind, digits)
     if kind == GridKind.TEXT64 and digits >= FIXED_TEXT:  # TEXT-01
         return _fixed_texts(magnitudes.view(np.float64), negative, digits - FIXED_TEXT)
@@ -168,7 +168,7 @@ def base_values(digits: int, magnitudes: Ints) -> Floats:
 
 
 def printed_magnitudes(digits: int, values: Floats) -> Ints:
-    """The magnitude of the nearest number of the base; the caller bounds it."""
+    """Magnitudes of the nearest numbers of the base, which the caller limits."""
     if digits == BASE_32:
         return binary32_magnitudes(values)
     if digits == BASE_64:
@@ -190,7 +190,7 @@ def printed_values(digits: int, style: int, magnitudes: Ints) -> Floats:
 
 
 def _is_reversible(digits: int, style: int) -> bool:
-    """Return True if the text determines the number among all of its base."""
+    """Return True if the text of a number differs from those of all others of its base."""
     if digits > BASE_GENERAL:
         return True
     n_digits = style - EXPONENT + 1 if style >= EXPONENT else style - SIGNIFICANT
@@ -222,7 +222,7 @@ def _short_fixed(x: float, decimals: int) -> str:
 
 
 def printed_texts(digits: int, style: int, flags: int, magnitudes: Ints, negative: Bools) -> Texts:
-    """Print numbers whose magnitudes are already checked."""
+    """Print numbers of checked magnitudes."""
     values = base_values(digits, magnitudes)
     if SIGNIFICANT < style < EXPONENT:
         return _general(values, style - SIGNIFICANT, flags, negative)
@@ -257,7 +257,7 @@ def _general(values: Floats, digits: int, flags: int, negative: Bools) -> Texts:
 
 
 def printed_shapes(tokens: Tokens, style: int) -> Bools:
-    """Tokens of the shape that the style prints."""
+    """Mask of the tokens in the shape that the style prints."""
     shape = tokens.fields[:, 2]
     good: Bools = shape & (kernels.BAD | kernels.SPECIAL) == 0
     if SIGNIFICANT < style < EXPONENT:

@@ -218,7 +218,7 @@ N_STYLES = 13
 
 
 class Survey(NamedTuple):
-    """Counts of numbers by decimals, of those without an exponent, and by digits.
+    """Counts of numbers by decimals (those without an exponent) and by digits.
 
     ``styles``: counts of the notations above.
     """

@@ -11,7 +11,7 @@ from mcz.model.numbers.rules import MIN_POWER
 # Columns of ``rules``, one row a channel.
 DIGITS, POWER, LIMIT = range(3)
 RULE_SIZE = 3
-FIXED, OTHER = 0, -1  # digits of a grid of fixed decimals; of one that is not decimal
+FIXED, OTHER = 0, -1  # ``digits`` of a grid of fixed decimals, and of a binary one
 ROWS = 256  # rows a pass, so that they stay in the processor's cache
 EXACT_POWER = 22
 NONE = 1 << 62  # above all magnitudes
@@ -93,7 +93,7 @@ def power_of(value: float, power: int, powers: Floats) -> int:
 
 
 def decimal(value: float, power: int, digits: int, tens: Floats, powers: Floats) -> tuple[int, int]:
-    """The mantissa of so many digits nearest to a value above 0, and the power of its first digit.
+    """The nearest mantissa of ``digits`` digits for a value above 0, and its first digit's power.
 
     A mantissa of 0: no product or quotient with a power of ten is exact enough. The search for the
     power begins at ``power``.
@@ -132,7 +132,7 @@ def ordinals_of_general(
     low, high = tens[digits - 1], tens[digits]
     power = shift = since = 0  # since: excess of magnitudes over mantissas
     ten = 1.0
-    least = above = 0.0  # sizes of that power of ten, of the number before
+    least = above = 0.0  # range of the previous number's power of ten
     for t in range(start, stop):
         value = values[t, c]
         size = abs(value)

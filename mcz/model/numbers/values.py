@@ -81,7 +81,7 @@ def print_rules(grids: Sequence[Grid]) -> Ints:
 
 
 def _print_rule(grid: Grid) -> tuple[int, ...]:
-    """The rules by which the compiled loop prints numbers of a grid."""
+    """Rules for the compiled loop that prints numbers of a grid."""
     if grid.kind not in DECIMAL_KINDS:
         return value_kernels.OTHER, *[0] * 7
     digits, *exponents = printed_exponents(grid.kind, grid.digits)

@@ -35,7 +35,7 @@ Item: TypeAlias = int | bytes | str
 Row: TypeAlias = tuple[Item, ...]
 
 MOST_BYTES = 8  # of a varint
-FEW_VARINTS = 8  # up to this number, Python is faster than NumPy
+FEW_VARINTS = 8  # up to which Python is faster than NumPy
 
 
 class Table(Sequence[R], Generic[R]):
@@ -260,4 +260,4 @@ def build_column(kind: construct.Construct, values: Column) -> bytes:
     return build_varints(cast(Numbers, values))
 
 
-columns = Columns  # the name of the type in declarations of records
+columns = Columns  # in lower case, as other types in declarations of records

@@ -34,9 +34,9 @@ from construct.core import CodeGen
 from mcz.errors import FormatError, MczError, TruncatedError
 from mcz.model.schema.types import CheckedInRecord, Exactly, Kind, as_construct, field_path
 
-COMPILED_FROM = 4096  # bytes from which compiling a schema, some milliseconds, is worthwhile
+COMPILED_FROM = 4096  # bytes that repay compiling a schema, some milliseconds
 MOST_KNOWN, MOST_BYTES = 256, 65536  # ends of records that ``parse_shared`` keeps, bytes of each
-# Errors of values that do not fit their field: of another type, too large, missing.
+# Errors for values of a wrong type, too large or missing.
 NO_VALUE = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, struct.error)
 
 
@@ -67,7 +67,7 @@ class Record:
     @classmethod
     @cache
     def compiled_type(cls, before: str | None = None) -> construct.Construct:
-        """The same, compiled: faster, but its errors do not name the field."""
+        """The compiled type: faster, but its errors do not name the field."""
         return RecordType(cls, before).compile()
 
 
@@ -157,7 +157,7 @@ def parse_shared(record: type[R], data: bytes, where: str, before: str) -> R:
     """``parse``, for many records that are alike from the field ``before`` on.
 
     These fields, which must not depend on those before them, are parsed once for equal bytes.
-    Records share them: nobody may change them.
+    Records share them: they are read-only.
     """
     stream = BytesIO(data)
     try:

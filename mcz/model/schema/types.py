@@ -144,7 +144,7 @@ class Checked(construct.Adapter):
 
 
 class CheckedInRecord(Checked):
-    """The same with a test of the value and the fields before it in its record."""
+    """A type with a test of the value and of the earlier fields of its record."""
 
     def _decode(self, obj: object, context: Container, path: str) -> object:
         if not self.test(obj, context):

@@ -35,8 +35,8 @@ THICK = 0.042  # radius of a bone, of the figure's size, from a start at that di
 SHORT = 0.45  # of its length, how thick a bone may be
 THIN = 0.010  # of the figure's size, which it may be in any case
 TRUNK = 1.5  # thickness of the trunk relative to other bones
-HEAD = 0.052  # radius of a head, of the figure's size
-DOT = 0.011  # radius of a marker, of the extent of all
+HEAD = 0.052  # radius of a head, as a share of the figure's size
+DOT = 0.011  # radius of a marker, as a share of the extent
 STEM = 0.3  # of the figure's size: a longer bone from a root to its only child is not part of it
 LEAST_LENGTH = 1e-3  # of the figure's size: a shorter bone has no length
 MOST_VARIATION = 0.5  # of its length: a bone that varies as much is none
@@ -99,7 +99,7 @@ def body_of(skeleton: Skeleton) -> Body:
 
 
 def _heads(skeleton: Skeleton, bones: Ints, owners: Ints) -> Ints:
-    """The bones that end in a head: of a row of that name the last."""
+    """Mask of the bones that end in a head: the last of a chain of joints with that name."""
     is_head = np.array(["head" in joint.name.lower() for joint in skeleton.joints], bool)[owners]
     going_on = bones[is_head[bones[:, 1]], 0]
     return np.flatnonzero(is_head[bones[:, 1]] & ~np.isin(bones[:, 1], going_on))
@@ -249,7 +249,7 @@ class Track:
             yield from zip(frames.tolist(), places, strict=True)
 
     def blocks(self) -> Iterator[tuple[Ints, Floats]]:
-        """The same by blocks: frames (n,), nodes (n, n_nodes, 3)."""
+        """Yield the places by blocks: frames (n,), nodes (n, n_nodes, 3)."""
         return _blocks(self.moving, self.body, self.frames, self.up, self.scale)
 
 
@@ -351,7 +351,7 @@ def _samples_per_frame(motion: MotionLike) -> int:
 
 
 def guess_up_axis(body: Body, places: Floats) -> str:
-    """The axis along which all is farthest from the feet; without feet y, of markers z."""
+    """The axis along which points are farthest from the feet; without feet y, for markers z."""
     feet = find_feet(body.skeleton)
     if feet:
         with np.errstate(all="ignore"):

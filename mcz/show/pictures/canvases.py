@@ -265,7 +265,9 @@ class _Gif:
         self._stream, self._fps = stream, fps
         self._palette: Any = None
         self._before: Any = None
-        self._waiting: tuple[Any, tuple[int, int], int] | None = None  # its time is not yet known
+        self._waiting: tuple[Any, tuple[int, int], int] | None = (
+            None  # its duration is unknown until the next one
+        )
         self._count = 0
 
     def add(self, pixels: Pixels) -> None:

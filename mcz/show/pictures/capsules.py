@@ -49,7 +49,7 @@ class Camera:
         return self.view.height / (2 * math.tan(FIELD / 2))
 
     def project(self, places: Floats) -> tuple[Floats, Floats]:
-        """Pixels (..., 2) of places (..., 3), and pixels a unit of length there, NaN behind."""
+        """Pixels (..., 2) of places (..., 3), and pixels a length unit; NaN behind the camera."""
         with np.errstate(all="ignore"):
             x, y, back = np.moveaxis((places - self.target) @ self.axes.T, -1, 0)
             ahead = self.distance - back

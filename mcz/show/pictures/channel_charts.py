@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 WIDTH, PANEL = 1000, 280  # pixels of a chart and the height of a panel
 LONGEST = 1024  # frames of a piece of a spectrum
 MOST_SERIES = 8  # of a signal's channels, unless they are chosen
-MOST_RUNS = 400  # between gaps: of more one line is drawn
+MOST_RUNS = 400  # lines between gaps; more are drawn as one
 LEAST_FRAMES = 8  # frames for a spectrum
 DEEP = 1e-8  # of the greatest power: less is not shown
 LEAST_POWER = 1e-290
 
 
 def unit_name(motion: Motion, kind: str) -> str:
-    """Unit of the numbers of a channel of that kind."""
+    """Unit of a channel's numbers."""
     if kind in ANGLE_KINDS:
         return {"deg": "degrees", "rad": "radians"}.get(motion.skeleton.angle_unit, "angle unit")
     if kind in POSITION_KINDS or kind == "length":
@@ -235,7 +235,7 @@ def spectrum_chart(motion: Motion, selection: Selection) -> Chart:
     """The power spectral densities of channels, and of a joint's speed if known.
 
     By Welch's method; unknown values are bridged straight, whole turns removed. If frames are
-    missing, of the longest part between two breaks in time. Raises MotionError for too few frames.
+    missing, the longest part without a break in time counts. Raises MotionError for too few frames.
     """
     notes: tuple[str, ...] = ()
     runs = [(0, motion.n_frames)] if motion.timeline is None else motion.timeline.runs

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".svg", ".html")
 MOST_TITLE, MOST_LABEL = 120, 40  # characters of texts in a picture
-MOST_POINTS = 3000  # of a line: of more the least and the greatest of neighbors
+MOST_POINTS = 3000  # of a line; beyond, the least and the greatest of neighbors
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ def line(axes: Axes, x: Floats, y: Floats, color: str, label: str = "", **option
 
 
 def thin_line(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """The same line with fewer points: of each run of neighbors its least and its greatest."""
+    """A line with fewer points: the least and the greatest of each run of neighbors."""
     if len(y) <= MOST_POINTS:
         return x, y
     width = -(-2 * len(y) // MOST_POINTS)

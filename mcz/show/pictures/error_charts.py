@@ -91,7 +91,7 @@ def errors_between(original: Motion, other: Motion) -> Errors:
 
 
 def _by_names(original: Motion, other: Motion) -> Errors:
-    """The same of the joints whose names both have."""
+    """Errors by joint, for joints that both motions have."""
     figures = joint_errors(original, other)
     if figures.mean is None or figures.frame is None or figures.greatest is None:
         raise MotionError(f"{original.name!r}, {other.name!r}: no point or joint to compare")

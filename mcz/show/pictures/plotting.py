@@ -328,4 +328,4 @@ def _motion(subject: MotionLike, cut: tuple[int, int] | None, facts: SourceOptio
     else:
         clip: Any = subject
         motion = clip.motion(cut)
-    return facts.completing(motion)
+    return facts.complete(motion)

@@ -225,7 +225,7 @@ class _Job:
                     canvas.draw(drawing_of(stage, number, nodes, words))
                     add_frame.add(canvas.pixels())
             size = stream.tell()
-        return self._rendered(size, len(frames), width, height, float(fps))
+        return self._result(size, len(frames), width, height, float(fps))
 
     def still(self, frames: Ints) -> Rendered:
         width, height = self.look.size or SIZE
@@ -234,7 +234,7 @@ class _Job:
         ((frame, nodes),) = stage.track
         words = label_texts(stage, width, height, self.moving.name, self._time_text(frame))
         canvas.draw(drawing_of(stage, 0, nodes, words))
-        return self._rendered(self._write_still(canvas), 1, width, height, None)
+        return self._result(self._write_still(canvas), 1, width, height, None)
 
     def sheet(self, frames: Ints) -> Rendered:
         layout = sheet_size(len(frames), self.look.size)
@@ -245,7 +245,7 @@ class _Job:
         title = f"{self.moving.name}"
         canvas.draw(sheet_drawing(stage, layout, title, self._time_text))
         size = self._write_still(canvas)
-        return self._rendered(size, len(frames), layout.width, layout.height, None)
+        return self._result(size, len(frames), layout.width, layout.height, None)
 
     def _stage(
         self,
@@ -275,7 +275,7 @@ class _Job:
             write_still(canvas, stream, Path(self.path).suffix.lower(), self.moving.name)
             return stream.tell()
 
-    def _rendered(
+    def _result(
         self, size: int, count: int, width: int, height: int, fps: float | None
     ) -> Rendered:
         return Rendered(str(self.path), size, count, width, height, fps, tuple(self.notes))

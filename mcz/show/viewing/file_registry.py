@@ -19,7 +19,7 @@ from mcz.container.source import ByteSource
 from mcz.errors import AccessError, LimitError, MczError, OptionError, reason_of
 from mcz.files.reading.file import open_bytes
 from mcz.files.reading.source_files import SourceOptions
-from mcz.hints import PYTHON_HINTS, Words, worded
+from mcz.hints import PYTHON_HINTS, Words, with_worded_hint
 from mcz.model.motion import Motion
 from mcz.model.types import Params
 from mcz.show.viewing.requests import Contents, FileContents, RemoteContents
@@ -33,7 +33,7 @@ MOST_RESULTS = 16  # files converted from a clip in view: the oldest is deleted 
 MOST_UPLOADS = 256  # files that the page gave
 MCZ = ".mcz"
 FACTS = ("rate", "unit", "up")  # facts that files may lack
-SCAN_FACTOR = 10  # of the duration of a scan of a folder: pause before the next one
+SCAN_FACTOR = 10  # pause before the next scan of a folder, in durations of the last
 
 
 class RegisteredFile(Protocol):
@@ -78,7 +78,7 @@ class Stored:
 
 
 class Remote:
-    """An ``.mcz`` behind a URL, opened on first use."""
+    """An ``.mcz`` at a URL, opened on first use."""
 
     kind = "mcz"
 
@@ -221,7 +221,7 @@ class FileRegistry:
         """``motion`` with the facts that its file lacks; raises OptionError."""
         rate, unit, up = map(self.facts.get, FACTS)
         options = SourceOptions(rate=rate, unit=unit, up=up)
-        return options.completing(motion)
+        return options.complete(motion)
 
     def initial_files(self) -> list[tuple[int, RegisteredFile]]:
         """The initial files, with their numbers."""
@@ -378,6 +378,6 @@ def pack(folder: Path, out: BinaryIO, registry: FileRegistry) -> None:
     report = pack(folder, out, jobs=threads.processors(), copies=False, **facts)
     for outcome in report.outcomes:
         if outcome.result == "failed":
-            registry.report(worded(outcome.message, registry.hints))
+            registry.report(with_worded_hint(outcome.message, registry.hints))
     if not any(outcome.result == "parsed" for outcome in report.outcomes):
         raise OptionError("none of its motion files is readable", path=folder)

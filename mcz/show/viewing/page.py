@@ -262,7 +262,7 @@ def _bytes_of(
     """The bytes of an ``.mcz`` for the page; raises LimitError beyond ``most``."""
     target = file.target()
     if options.is_coded:
-        return _coded(target, registry, options)
+        return _encode_file(target, registry, options)
     facts = ", ".join(fact for fact in FACTS if registry.facts.get(fact) is not None)
     if facts and file.kind == "mcz":
         text = f"{file.name}: copied as it is, without the {facts} that you give"
@@ -295,7 +295,7 @@ def _cut(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
     return out.getvalue()
 
 
-def _coded(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
+def _encode_file(target: str, registry: FileRegistry, options: PageOptions) -> bytes:
     from mcz.container.writer import Writer
     from mcz.files.writing.clip_writer import write_plan
     from mcz.files.writing.planning import prepare, under_its_path

@@ -109,8 +109,8 @@ def _template() -> str:
 
 
 MOST_POINTS = 4096
-MOST_READ = 3000  # frames of a clip that are decoded to show some of them
-MOST_NUMBERS = 2**21  # likewise, of all channels
+MOST_READ = 3000  # most frames of a clip that are decoded for a player
+MOST_NUMBERS = 2**21  # most numbers that are decoded for a player
 RATE = 30.0  # sufficient frames a second; the player interpolates
 MISSING = -32768  # the word of an unknown coordinate
 LARGEST = 32767
@@ -157,7 +157,7 @@ def figure(skeleton: Skeleton) -> Figure:
 def sample_points(motion: Moving, most_frames: int, every: int = 1) -> PointSamples:
     """At most ``most_frames`` frames of a Motion or Clip; raises MczError for one without points.
 
-    ``every`` is the least distance of two of them.
+    ``every`` is the least distance between two of them.
     """
     skeleton = motion.skeleton
     n_read = frames_read(motion)
@@ -176,7 +176,7 @@ def sample_points(motion: Moving, most_frames: int, every: int = 1) -> PointSamp
 
 
 def frames_read(motion: Moving) -> int:
-    """Number of frames that are used: of a clip, which must be decoded, the first of many."""
+    """Number of frames to show; a long clip, which must be decoded, is cut."""
     if isinstance(motion, Motion):
         return motion.n_frames
     return min(motion.n_frames, MOST_READ, MOST_NUMBERS // max(1, motion.n_channels) + 1)
@@ -210,7 +210,7 @@ def _words(places: NDArray[np.float64]) -> tuple[Words, float, NDArray[np.float6
 
 
 def lines_of(skeleton: Skeleton) -> list[tuple[int, int]]:
-    """The points at both ends of each line: of a joint and its parent, and of its end sites.
+    """The two points of each line: a joint and its parent, a joint and its end sites.
 
     Pictures have nodes (``mcz.show.pictures.bodies``), which include origins that are not points.
     """

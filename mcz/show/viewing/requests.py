@@ -271,7 +271,7 @@ class Contents(Protocol):
     tag: str
 
     def pieces(self, start: int, stop: int) -> Iterator[bytes]:
-        """Bytes start <= b < stop in pieces; fewer if the file has become shorter meanwhile."""
+        """Yield the bytes start <= b < stop in pieces; fewer if the file has become shorter."""
         ...
 
     def close(self) -> None: ...
@@ -300,7 +300,7 @@ class FileContents:
 
 
 class RemoteContents:
-    """A file behind a URL, read by ranges; it does not change while open."""
+    """A file at a URL, read by ranges; it does not change while open."""
 
     def __init__(self, source: ByteSource, tag: str) -> None:
         self._source, self.size, self.tag = source, source.size, tag

@@ -35,7 +35,7 @@ from mcz.show.viewing.requests import (
     length_of,
     range_of,
 )
-from mcz.show.viewing.server_tasks import ServerTasks, Site, Visitors, lossy_codecs
+from mcz.show.viewing.server_tasks import OpenPages, ServerTasks, Site, lossy_codecs
 
 PULSE = 1.0  # seconds between two checks of an open page
 BEAT = 15  # pulses between two signs of life
@@ -65,15 +65,15 @@ class Handler(BaseHTTPRequestHandler):
         return cast(Site, cast(Any, self.server).site)
 
     def do_GET(self) -> None:
-        self._guarded(self._get, unread=False)
+        self._answer(self._get, unread=False)
 
     def do_HEAD(self) -> None:
-        self._guarded(self._get, unread=False)
+        self._answer(self._get, unread=False)
 
     def do_POST(self) -> None:
-        self._guarded(self._post, unread=True)
+        self._answer(self._post, unread=True)
 
-    def _guarded(self, answer: Callable[[str], None], *, unread: bool) -> None:
+    def _answer(self, answer: Callable[[str], None], *, unread: bool) -> None:
         """Answer an allowed request; answer others with the reason."""
         self._unread, self._has_answered = unread, False
         try:
@@ -105,7 +105,7 @@ class Handler(BaseHTTPRequestHandler):
         if path == "":
             self._send(self._site.page.text.encode(), "text/html; charset=utf-8", 200)
         elif path == "api.json":
-            self._send_json(self._site.work.document())
+            self._send_json(self._site.tasks.document())
         elif path == "alive":
             self._alive()
         elif match := re.fullmatch(r"files/([0-9]{1,9})", path):
@@ -153,14 +153,14 @@ class Handler(BaseHTTPRequestHandler):
         if self.command == "HEAD":
             self._head(200, {"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
             return
-        with self._site.visitors as visitors:
+        with self._site.open_pages as pages:
             head = {"Content-Type": "text/event-stream", "Connection": "close"}
             self._head(200, {**head, "Cache-Control": "no-store"})
             pulses = 0
             while not self._is_gone():
                 if pulses % BEAT == 0:
                     self.wfile.write(b": here\n\n")
-                if not visitors.stay(PULSE):
+                if not pages.stay(PULSE):
                     self.wfile.write(b"event: end\ndata: \n\n")
                     break
                 pulses += 1
@@ -176,17 +176,17 @@ class Handler(BaseHTTPRequestHandler):
     # Tasks to post ---------------------------------------------------------------
 
     def _post(self, path: str) -> None:
-        work = self._site.work
+        server_tasks = self._site.tasks
         if path == "convert":
-            size = length_of(self.headers, work.most_posted)
-            result = work.convert(self.rfile, size, self.headers.get("Content-Type", ""))
+            size = length_of(self.headers, server_tasks.most_posted)
+            result = server_tasks.convert(self.rfile, size, self.headers.get("Content-Type", ""))
             self._unread = False
             self._send_json(result)
             return
         tasks: Mapping[str, Callable[[JsonObject], object]] = {
-            "encode": work.encode,
-            "diff": work.diff,
-            "glb": work.glb,
+            "encode": server_tasks.encode,
+            "diff": server_tasks.diff,
+            "glb": server_tasks.glb,
         }
         if path not in tasks:
             raise Refused(404, "there is nothing here")
@@ -195,7 +195,7 @@ class Handler(BaseHTTPRequestHandler):
         data = self.rfile.read(length_of(self.headers, LONGEST_JSON))
         self._unread = False
         document = json_of(data)
-        with work.turn(self._is_gone):
+        with server_tasks.turn(self._is_gone):
             answer = tasks[path](document)
         if isinstance(answer, bytes):
             self._send(answer, "model/gltf-binary", 200)
@@ -250,7 +250,7 @@ class Handler(BaseHTTPRequestHandler):
         """Log nothing, for privacy."""
 
 
-GRACE = 5.0  # seconds in which a page may come back, such as on a reload
+GRACE = 5.0  # seconds for a page to come back, such as on a reload
 MOST_CONNECTIONS = 128
 HOSTS = {"127.0.0.1": "127.0.0.1", "localhost": "127.0.0.1", "::1": "::1"}
 
@@ -284,7 +284,7 @@ class Server(ThreadingHTTPServer):
             page,
             registry,
             ServerTasks(registry),
-            Visitors(GRACE if grace is None else grace),
+            OpenPages(GRACE if grace is None else grace),
             secrets.token_urlsafe(24),
         )
         self._free = BoundedSemaphore(MOST_CONNECTIONS)
@@ -312,7 +312,7 @@ class Server(ThreadingHTTPServer):
 
     def close(self) -> None:
         """Stop answering, and delete converted files."""
-        self.site.visitors.close()
+        self.site.open_pages.close()
         with suppress(OSError):
             self.shutdown()
             self.server_close()

@@ -40,7 +40,7 @@ from mcz.sources import FORMATS
 
 MOST_POSTED = 2**30  # bytes of the files of an upload
 MOST_WAITING = 8  # requests that wait for their turn
-MOST_CACHED, CACHED_BYTES = 2, 2**28  # decoded motions that are at hand, and bytes of each at most
+MOST_CACHED, CACHED_BYTES = 2, 2**28  # cached motions, and most bytes of one
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
 OWN_BASES = "basis"  # the only parameter that may name a file
 
@@ -90,13 +90,13 @@ class ServerTasks:
         ]
 
     def convert(self, stream: Readable, size: int, content_type: str) -> JsonObject:
-        """Make an ``.mcz`` of the files of a form; of several motions one archive."""
+        """Make an ``.mcz`` from uploaded files; several motions make one archive."""
         boundary = boundary_of(content_type)
         folder = self._registry.new_folder()
         try:
             paths = save_files(stream, size, boundary, folder)
             with self.turn():
-                return self._converted(folder, paths)
+                return self._convert_files(folder, paths)
         except OSError as error:
             raise Refused(507, f"cannot store the files: {error.strerror}") from None
         except MczError as error:
@@ -106,7 +106,7 @@ class ServerTasks:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
-    def _converted(self, folder: Path, paths: list[Path]) -> JsonObject:
+    def _convert_files(self, folder: Path, paths: list[Path]) -> JsonObject:
         motions = [path for path in paths if path.suffix.lower() != ".asf"]
         if not motions:
             raise Refused(400, "no motion file was given")
@@ -228,7 +228,7 @@ def url_of(number: int) -> str:
 def lossy_codecs() -> list[JsonObject]:
     """Lossy codecs for a slider: their parameters, and the range of the dial.
 
-    The keys are those of ``mcz codecs --json``, and ``dial``. The one called "lossy" is first.
+    Keys as in ``mcz codecs --json``, and ``dial``. The default, "lossy", comes first.
     """
     from mcz.codecs import CODECS, codec_by_name
 
@@ -274,8 +274,8 @@ class Site:
 
     page: Page
     registry: FileRegistry
-    work: ServerTasks
-    visitors: Visitors
+    tasks: ServerTasks
+    open_pages: OpenPages
     token: str
     port: int = 0
 
@@ -283,8 +283,8 @@ class Site:
 PULSE = 0.5  # seconds between two checks, so that Ctrl-C works on every system
 
 
-class Visitors:
-    """A context is an open page; ``grace``: seconds in which one may come back."""
+class OpenPages:
+    """Counts open pages, each a context; ``grace``: seconds for a page to come back."""
 
     def __init__(self, grace: float) -> None:
         self._grace = grace
@@ -292,7 +292,7 @@ class Visitors:
         self.is_closing = False
         self._changed = Condition()
 
-    def __enter__(self) -> Visitors:
+    def __enter__(self) -> OpenPages:
         with self._changed:
             self._n_open += 1
             self._n_seen += 1
@@ -311,13 +311,13 @@ class Visitors:
             self._changed.notify_all()
 
     def stay(self, seconds: float) -> bool:
-        """Wait so long; return whether the page may stay open."""
+        """Wait for ``seconds``; return True if the page may stay open."""
         with self._changed:
             self._changed.wait_for(lambda: self.is_closing, seconds)
             return not self.is_closing
 
     def wait(self, *, for_ever: bool = False) -> None:
-        """Wait until a page was open and all have been closed for the time of grace.
+        """Wait until a page was open and all have been closed for ``grace`` seconds.
 
         ``for_ever``: until ``close``.
         """

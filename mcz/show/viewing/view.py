@@ -109,7 +109,7 @@ def _print_line(line: str) -> None:
 
 
 def _player_of(thing: Thing, options: JsonObject, salvage: bool) -> str:
-    """A player of a Motion or Clip, or of a file; of an ``.mcz`` it shows the first clip."""
+    """A player of a Motion, a Clip or a file; it shows the first clip of an ``.mcz``."""
     from mcz.files.reading.file import open
     from mcz.files.reading.read import read
 

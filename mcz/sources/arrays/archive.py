@@ -204,7 +204,7 @@ def _entry(data: bytes, at: int, end: int) -> tuple[ArchiveMember, int]:
 
 
 def _check_names(members: list[ArchiveMember]) -> None:
-    """Raise SourceError for names of which NumPy and zipfile make one array."""
+    """Raise SourceError for names that NumPy or zipfile take as equal."""
     seen = set()
     for member in members:
         name = member.name.partition("\0")[0].removesuffix(".npy")
@@ -214,7 +214,7 @@ def _check_names(members: list[ArchiveMember]) -> None:
 
 
 def _check_local(data: bytes, member: ArchiveMember, raw: bytes) -> None:
-    """Raise SourceError if the local header of a member is about something else."""
+    """Raise SourceError if the local header differs from the directory."""
     at = member.at
     if data[at + 30 : at + 30 + _number(data, at + 26, 2)] != raw:
         raise SourceError(f"member {member.name!r} has another name in its local header", offset=at)
@@ -250,7 +250,7 @@ def _local_sizes(data: bytes, member: ArchiveMember) -> list[tuple[int, int, int
 def _zip64_numbers(
     data: bytes, plain: list[tuple[int, int]], extra: int, size: int
 ) -> list[tuple[int, int, int]]:
-    """Numbers of 4 bytes, or of the 8 bytes of the extra field that stand for them."""
+    """Numbers of 4 bytes, or the 8 bytes of the extra field that replace them."""
     at, stop = _zip64(data, extra, extra + size)
     numbers = []
     for where, width in plain:

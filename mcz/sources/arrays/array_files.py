@@ -37,7 +37,7 @@ NO_CLIPS = "{n} clips in one file, such as {one!r} and {two!r}, have no array in
 class Library:
     """The arrays that all clips have, joined; ``members`` are the indices of each in its file.
 
-    ``parts`` are the frame numbers of each clip, first and behind the last.
+    ``parts`` are the frame numbers of each clip, [first, stop).
     """
 
     names: tuple[str, ...]
@@ -89,7 +89,7 @@ def join_clips(arrays: Sequence[Array], clips: Mapping[str, Mapping[str, int]]) 
     counts = [frames_of([each[key] for key in shared]) for each in own.values()]
     starts = np.cumsum([1, *(count + 1 for count in counts)]).tolist()
     joined = {
-        key: _joined(arrays)
+        key: _join_arrays(arrays)
         for key, arrays in shared.items()
         if arrays[0].kept or _have_even_rows(arrays, counts)
     }
@@ -133,7 +133,7 @@ def _have_even_rows(arrays: Sequence[Array], counts: Sequence[int]) -> bool:
     return all(n_rows * most == rows * count for n_rows, count in pairs)
 
 
-def _joined(arrays: Sequence[Array]) -> Array:
+def _join_arrays(arrays: Sequence[Array]) -> Array:
     """The array of all clips."""
     one = max(arrays, key=lambda array: 0 if array.kept else array.n_rows)
     if one.kept:
@@ -173,7 +173,7 @@ def read_npy(data: bytes, name: str = "motion") -> Motion:
     """
     pickle = npy_objects(data)
     if pickle is not None:
-        return _pickled("npy", name, pickle)
+        return _pickle_motion("npy", name, pickle)
     return _motion("npy", name, [npy_array(data)], Archive(data, len(data)))
 
 
@@ -182,7 +182,7 @@ def read_pickle_file(data: bytes, name: str = "motion") -> Motion:
 
     Raises SourceError, with the offset at fault, for one that has anything else than data.
     """
-    return _pickled("pickle", name, read_pickle(data))
+    return _pickle_motion("pickle", name, read_pickle(data))
 
 
 def read_torch(data: bytes, name: str = "motion") -> Motion:
@@ -190,10 +190,10 @@ def read_torch(data: bytes, name: str = "motion") -> Motion:
 
     Raises SourceError, with the offset at fault, for one that has anything else than data.
     """
-    return _pickled("torch", name, read_tensors(data))
+    return _pickle_motion("torch", name, read_tensors(data))
 
 
-def _pickled(format_name: str, name: str, pickle: Pickle) -> Motion:
+def _pickle_motion(format_name: str, name: str, pickle: Pickle) -> Motion:
     library = join_clips(pickle.arrays, pickle.clips) if pickle.clips else None
     motion = _motion(format_name, name, pickle.arrays, pickle.archive, pickle.notes, library)
     if library is not None:

@@ -101,7 +101,7 @@ def offsets_of_model(
 
 
 def offsets_of_joints(joints: ArrayLike, parents: Sequence[int]) -> Floats:
-    """From each parent to its joint, of joints at rest, (n_joints, 3); of a root, its place."""
+    """From each parent to its joint at rest, (n_joints, 3); for a root, its position."""
     places = np.asarray(joints, np.float64)
     offsets = places.copy()
     for joint, parent in enumerate(parents):
@@ -159,7 +159,7 @@ def offsets_from_positions(
 
 
 def _check_tree(file: Path, parents: list[int], n_joints: int) -> None:
-    """Raises OptionError if the model's joints are others than those of so many."""
+    """Raise OptionError if the model's joints are not those of the body tree."""
     if not has_tree(n_joints):
         return
     body = tree(n_joints)
@@ -196,7 +196,7 @@ class _Model:
                     (1, 0): np.lib.format.read_array_header_1_0,
                     (2, 0): np.lib.format.read_array_header_2_0,
                 }[version]
-                shape, by_columns, dtype = read(member)
+                shape, is_fortran, dtype = read(member)
             except (ValueError, KeyError, SyntaxError) as error:
                 raise SourceError(f"not an NPY array: {error}", where=where) from None
             if dtype.hasobject:
@@ -209,14 +209,14 @@ class _Model:
             data = member.read(size)
         if len(data) != size:
             raise SourceError(f"only {len(data)} of {size} bytes are present", where=where)
-        return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
+        return np.frombuffer(data, dtype).reshape(shape, order="F" if is_fortran else "C")
 
     def parents(self) -> list[int]:
         table = self.array("kintree_table")
         if table.ndim != 2 or len(table) < 1 or not table.shape[1]:
             raise SourceError(f"kintree_table of shape {table.shape}, not (2, n)", path=self.file)
         parents = [int(parent) for parent in table[0]]
-        parents[0] = -1  # what stands there is 2^32 - 1, or -1
+        parents[0] = -1  # files have 2^32 - 1, or -1
         for joint, parent in enumerate(parents[1:], 1):
             if not 0 <= parent < joint:
                 raise SourceError(

@@ -1,6 +1,6 @@
-"""Arrays of a file: the head of an NPY, and numbers as columns on number grids.
+"""Arrays of a file: headers of NPY, and columns of numbers with their number grids.
 
-The grid of a column is a writer's choice; all bits of a column come back from any of them.
+The grid of a column is a writer's choice: each restores all bits.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from mcz.sources.arrays.layout import TYPES
 
 MAGIC = b"\x93NUMPY"
 VERSIONS = ((1, 0), (2, 0), (3, 0))
-MAX_HEAD = 10_000  # bytes; NumPy takes no more of a file that nobody vouches for
-MAX_AXES = 64  # those of NumPy
+MAX_HEAD = 10_000  # bytes, NumPy's limit for an untrusted file
+MAX_AXES = 64  # NumPy's limit
 _NUMBER = re.compile(rb"\d+")
 _PLAIN = re.compile(rb"0|[1-9]\d{0,17}")
 _BLANKS = rb"[ \t\r\n]*"
@@ -42,23 +42,22 @@ _CLOSE = re.compile(rb"\}" + _BLANKS)
 
 @dataclass(frozen=True, slots=True)
 class NpyHead:
-    """``start`` is where the numbers of an array begin, of shape ``shape`` and type ``code``.
+    """The header of an array, or only its ``fault``.
 
-    ``code`` is NumPy's without byte order, such as "f8"; "O" of pickled objects. ``rows_at`` and
-    ``end`` are where the length of the first axis is printed, and where the text ends that may
-    follow it, without the blanks behind; unless ``is_printed``, it is an integer there, and the
-    number of all numbers one at ``items_at``. A fault of the head is ``odd``, and there is no more
-    then.
+    The numbers begin at ``start``; ``code`` is their type as NumPy has it, without byte order, such
+    as "f8"; "O" for pickled objects. ``rows_at`` is the place of the length of the first axis,
+    ``end`` that of the end of the text, without blanks. If not ``is_printed``, that length is a
+    binary integer, and so is the count of all numbers at ``items_at``.
     """
 
     start: int = 0
     shape: tuple[int, ...] = ()
     code: str = ""
     big_endian: bool = False
-    by_columns: bool = False
+    is_fortran: bool = False
     rows_at: tuple[int, int] = (0, 0)
     end: int = 0
-    odd: str = ""
+    fault: str = ""
     is_printed: bool = True
     items_at: tuple[int, int] = (0, 0)
 
@@ -69,39 +68,39 @@ class NpyHead:
 
     @property
     def size(self) -> int:
-        """Bytes of the numbers, of a type that ``is_number``."""
+        """Bytes of the numbers; their type must be ``is_number``."""
         return prod(self.shape) * int(self.code[1:])
 
 
 def read_head(data: bytes, at: int, stop: int) -> NpyHead:
-    """The head of the NPY file in data[at:stop]; see ``Head.odd``."""
+    """Read the header of the NPY file in data[at:stop]; see ``NpyHead.fault``."""
     if data[at : at + 6] != MAGIC or stop < at + 10:
-        return NpyHead(odd=f"offset {at}: no NPY file, which begins with \\x93NUMPY")
+        return NpyHead(fault=f"offset {at}: no NPY file, which begins with \\x93NUMPY")
     version = data[at + 6], data[at + 7]
-    wide = 2 if version == (1, 0) else 4
+    size_bytes = 2 if version == (1, 0) else 4
     if version not in VERSIONS:
         return NpyHead(
-            odd=f"offset {at + 6}: version {version[0]}.{version[1]} of NPY is not known"
+            fault=f"offset {at + 6}: version {version[0]}.{version[1]} of NPY is not known"
         )
-    text_at = at + 8 + wide
+    text_at = at + 8 + size_bytes
     size = int.from_bytes(data[at + 8 : text_at], "little")
     if size > MAX_HEAD or text_at + size > stop:
-        return NpyHead(odd=f"offset {at + 8}: a head of {size} bytes is too long")
+        return NpyHead(fault=f"offset {at + 8}: a head of {size} bytes is too long")
     return _parse_header(data[text_at : text_at + size], text_at, stop)
 
 
 def _parse_header(text: bytes, at: int, stop: int) -> NpyHead:
     """Parse the text of a header at offset ``at``."""
-    items = _items(text)
+    items = _parse_items(text)
     if items is None:
         return NpyHead(
-            odd=f"offset {at}: the head is no plain dictionary of descr, fortran_order and shape"
+            fault=f"offset {at}: the head is no plain dictionary of descr, fortran_order and shape"
         )
     descr, order, shape = items[b"descr"], items[b"fortran_order"], items[b"shape"]
     numbers = _NUMBER.findall(shape[1])
     if len(numbers) > MAX_AXES or not all(map(_PLAIN.fullmatch, numbers)):
         return NpyHead(
-            odd=f"offset {at + shape.start(1)}: the shape {shape[1][:60]!r} is no plain one"
+            fault=f"offset {at + shape.start(1)}: the shape {shape[1][:60]!r} is no plain one"
         )
     lengths = tuple(map(int, numbers))
     byte_order, code = _type_of(descr)
@@ -115,26 +114,26 @@ def _parse_header(text: bytes, at: int, stop: int) -> NpyHead:
     )
     if head.is_number and head.size != stop - head.start:
         return NpyHead(
-            odd=f"offset {head.start}: {stop - head.start} bytes of numbers, but shape {lengths} "
+            fault=f"offset {head.start}: {stop - head.start} bytes of numbers, but shape {lengths} "
             f"of {code} has {head.size}"
         )
     return head
 
 
-def _items(text: bytes) -> dict[bytes, re.Match[bytes]] | None:
-    """The three values of a head, a dictionary in Python's words; None if it is not so plain.
+def _parse_items(text: bytes) -> dict[bytes, re.Match[bytes]] | None:
+    """Parse a header, a Python dictionary, into its three values; None if it is not plain.
 
-    A key that is there twice, another key, a comment or an escape might mean something else to
-    NumPy, which evaluates the text.
+    NumPy evaluates the text: a repeated or further key, a comment or an escape might have a
+    meaning.
     """
     at, items = 0, dict[bytes, re.Match[bytes]]()
     last = _OPEN.match(text)
     while last is not None:
         at = last.end()
-        item = next(filter(None, (pattern.match(text, at) for pattern in _ITEMS.values())), None)
-        if item is None:
+        matches = {key: item for key, value in _ITEMS.items() if (item := value.match(text, at))}
+        if not matches:
             break
-        key = next(key for key, pattern in _ITEMS.items() if pattern is item.re)
+        [(key, item)] = matches.items()
         if key in items:
             return None
         items[key], at = item, item.end()
@@ -151,9 +150,9 @@ def _type_of(descr: re.Match[bytes]) -> tuple[bytes, str]:
 
 def has_rows(data: bytes) -> bool:
     """Return True if ``data`` begins with the header of numbers with at least two axes."""
-    size = int.from_bytes(data[8 : 10 if data[6:7] == b"\1" else 12], "little")
     begin = 10 if data[6:7] == b"\1" else 12
-    items = _items(data[begin : begin + min(size, MAX_HEAD)])
+    size = int.from_bytes(data[8:begin], "little")
+    items = _parse_items(data[begin : begin + min(size, MAX_HEAD)])
     if items is None:
         return False
     return _type_of(items[b"descr"])[1] in TYPES and len(_NUMBER.findall(items[b"shape"][1])) > 1
@@ -161,8 +160,8 @@ def has_rows(data: bytes) -> bool:
 
 def refuse_faulty_head(head: NpyHead) -> None:
     """Raise SourceError if a head has a fault."""
-    if head.odd:
-        raise SourceError(head.odd)
+    if head.fault:
+        raise SourceError(head.fault)
 
 
 DIRECTORY_END = b"PK\5\6"
@@ -171,7 +170,7 @@ DIRECTORY_END = b"PK\5\6"
 def is_motion(data: bytes) -> bool:
     """Return True if an NPY or NPZ that begins with ``data`` may have a row of numbers per frame.
 
-    What cannot be told from these bytes counts: the reader says what is wrong.
+    True in doubt: the reader then states the fault.
     """
     heads = [match.start() for match in re.finditer(re.escape(MAGIC), data)]
     is_whole = not data.startswith(b"PK") or DIRECTORY_END in data
@@ -181,18 +180,18 @@ def is_motion(data: bytes) -> bool:
 BINARY32, BINARY64, INTEGER = (
     Grid(kind) for kind in (GridKind.BINARY32, GridKind.BINARY64, GridKind.INTEGER)
 )
-NANS = {2: 0x7E00, 4: 0x7FC00000, 8: 0x7FF8000000000000}  # the NaN that values have, by bytes
-MOST_DECIMALS = 9  # that are looked for in binary64
-LEAST_OF_MANY = 6  # decimals up to which they are preferred to binary32
-LARGEST = 2.0**51  # magnitudes of decimals are below it
-SAMPLE = 64  # rows that are looked at before all of a column are
+NANS = {2: 0x7E00, 4: 0x7FC00000, 8: 0x7FF8000000000000}  # bits of the usual NaN, by bytes
+MOST_DECIMALS = 9  # of a grid for binary64
+LEAST_OF_MANY = 6  # most decimals of a grid preferred to BINARY32
+LARGEST = 2.0**51  # bound of the magnitudes of decimals
+SAMPLE = 64  # rows tried before a whole column
 
 
 @dataclass(frozen=True, slots=True)
 class ArrayColumns:
     """Columns of one array, (rows, columns), binary64 or int64, and the grid of each.
 
-    ``ordinals`` are there if values do not say them: of NaNs with other bits than usual.
+    ``ordinals``: None unless there are NaNs with unusual bits, which values cannot hold.
     """
 
     values: Values
@@ -205,7 +204,7 @@ def words_of(data: bytes, head: NpyHead) -> Items:
     order = ">" if head.big_endian else "<"
     n_words = head.size // int(head.code[1:])
     words = np.frombuffer(data, order + head.code, n_words, head.start)
-    shaped = words.reshape(head.shape, order="F" if head.by_columns else "C")
+    shaped = words.reshape(head.shape, order="F" if head.is_fortran else "C")
     return shaped.reshape(head.shape[0] if head.shape else 1, -1)
 
 
@@ -213,7 +212,7 @@ def file_columns(head: NpyHead) -> NDArray[np.int64]:
     """The column of each number of a row, in the order in which the file has them."""
     inner = head.shape[1:]
     columns = np.arange(int(np.prod(inner, dtype=np.int64))).reshape(inner)
-    return columns.ravel(order="F" if head.by_columns else "C")
+    return columns.ravel(order="F" if head.is_fortran else "C")
 
 
 def misfit_reason(words: Items) -> str:
@@ -238,7 +237,7 @@ def columns_of(words: Items) -> ArrayColumns:
     """The columns of numbers (rows, columns), which grids store bit for bit."""
     if words.dtype.kind != "f":
         return ArrayColumns(words.astype(np.int64), (INTEGER,) * words.shape[1])
-    with np.errstate(invalid="ignore"):  # of NaNs that signal
+    with np.errstate(invalid="ignore"):  # signaling NaNs
         values = np.require(words, np.float64, ("C", "A"))  # members lie at any offset
     grids = (BINARY32,) * words.shape[1] if words.dtype.itemsize < 8 else _grids_of(values)
     nan = np.isnan(values)
@@ -248,7 +247,7 @@ def columns_of(words: Items) -> ArrayColumns:
     if (bits[nan] == NANS[words.dtype.itemsize]).all():
         return ArrayColumns(values, grids)
     grid = BINARY32 if words.dtype.itemsize == 4 else BINARY64
-    values = np.where(nan, np.nan, values)  # of one NaN, whatever its bits were
+    values = np.where(nan, np.nan, values)  # the usual NaN in place of all others
     return ArrayColumns(values, (grid,) * len(grids), grid.ordinals_of_bits(bits))
 
 
@@ -259,7 +258,7 @@ def _bits(words: Items) -> Items:
 
 
 def _grids_of(values: NDArray[np.float64]) -> tuple[Grid, ...]:
-    """The grid of each column of binary64: decimals if all are short, else binary."""
+    """The grid of each column of binary64: FIXED if all numbers are short, else binary."""
     n_rows, n_columns = values.shape
     sample = values[np.linspace(0, n_rows - 1, min(SAMPLE, n_rows)).astype(np.int64)]
     places = np.array([_decimals(sample[:, c]) for c in range(n_columns)], np.int64)
@@ -283,7 +282,7 @@ def _grids_of(values: NDArray[np.float64]) -> tuple[Grid, ...]:
 
 
 def _decimals(values: NDArray[np.float64], least: int = 0) -> int:
-    """The fewest decimals, ``least`` or more, of which all values are; -1: of none."""
+    """The fewest decimals, ``least`` or more, that hold all values; -1 if none do."""
     if not np.isfinite(values).all():
         return -1
     largest = float(np.abs(values).max(initial=0.0))
@@ -303,7 +302,7 @@ def signal_of(
     channels: tuple[Channel, ...] | None = None,
     role: str = "",
 ) -> Signal:
-    """One signal of the columns of all parts, one behind the other; NaN is invalid."""
+    """One signal with the columns of all parts side by side; NaN is invalid."""
     grids = tuple(grid for part in parts for grid in part.grids)
     if all(grid.kind == GridKind.INTEGER for grid in grids):
         values = np.hstack([part.values for part in parts])
@@ -328,17 +327,16 @@ def _ordinals(part: ArrayColumns) -> NDArray[np.int64]:
     return Signal(part.values, part.grids).to_ordinals()[0]
 
 
-LARGE = 1024  # bytes of an array: that a larger one is kept is said
-MAX_TEXT = 2**16  # bytes of an array of text that are looked at
+LARGE = 1024  # bytes of an array that gets a note if its numbers are not read
+MAX_TEXT = 2**16  # bytes of an array that are examined as text
 
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """An array; ``kept`` says why it stays its bytes, "" if its numbers are read.
+    """An array, whose numbers are read unless ``kept`` gives a reason to store only its bytes.
 
-    ``stop`` is where its bytes end, 0 of one whose bytes are not looked into. ``words`` are its
-    numbers, (rows, columns), if it has some; ``text`` is that of one without. ``is_loud``: that
-    it is kept is worth a note.
+    ``stop`` is the end of its bytes, 0 if they are not examined. ``words`` are its numbers, (rows,
+    columns), None if it has none; then ``text`` is its text. ``is_loud``: a kept array gets a note.
     """
 
     name: str
@@ -389,11 +387,11 @@ def _member(data: bytes, member: ArchiveMember) -> Array:
         return Array(name, NpyHead(), kept=how, is_loud=True)
     start, stop = member.contents
     head = read_head(data, start, stop)
-    if head.odd:
-        odd = head.odd
+    if head.fault:
+        fault = head.fault
         if member.is_deflated:  # offsets count from the beginning of the contents
-            odd = f"inflated, {read_head(data[start:stop], 0, stop - start).odd}"
-        return Array(name, NpyHead(), kept=f"no array ({odd})", is_loud=name != member.name)
+            fault = f"inflated, {read_head(data[start:stop], 0, stop - start).fault}"
+        return Array(name, NpyHead(), kept=f"no array ({fault})", is_loud=name != member.name)
     return array_of(name, data, head, stop)
 
 

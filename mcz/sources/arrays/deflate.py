@@ -42,7 +42,7 @@ LEVELS = {  # parameters of zlib's search, by its levels
 NO_SEARCH = 0  # in place of a level: the stream is kept
 ATTEMPTS = (6, 9, 1, 5, 4, 7, 8, 3, 2)  # levels that are tried, the usual first
 CODE_ORDER = (16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15)
-MOST_ITEMS = 2**16  # blocks, and corrections, of a stream
+MOST_ITEMS = 2**16  # most blocks, and most corrections, of a stream
 STORED_SIZE = 2**16 - 1  # most bytes of a stored block
 MOST_PER_BYTE = 2  # bytes of a stream for each of its contents: codes have 15 bits at most
 FAULTS = {
@@ -114,7 +114,7 @@ def is_kept(part: bytes) -> bool:
 
 
 def restore_stream(part: bytes, contents: bytes) -> bytes:
-    """The deflate stream of ``contents``, of stored blocks if they are not as they were.
+    """The deflate stream of ``contents``, in stored blocks if they have changed.
 
     Raises FormatError if ``part`` does not make one.
     """
@@ -151,7 +151,7 @@ def _split(
     blocks = np.zeros((min(MOST_ITEMS, 8 * len(stream)), 4), np.int64)
     corrections = np.zeros((most, 3), np.int64)
     n_blocks, n_corrections = loops.split_stream(
-        _padded(stream), *_work(contents, level), blocks, corrections
+        _pad(stream), *_work(contents, level), blocks, corrections
     )
     if n_blocks < 0:
         return None
@@ -189,13 +189,13 @@ def _join(described: Deflated, contents: bytes) -> bytes:
     size = MOST_PER_BYTE * len(contents) + len(codes) + 8 * len(blocks) + SPARE
     out = np.zeros(size, np.uint8)
     work = _work(contents, described.level)
-    written = loops.join_stream(*work, blocks, _padded(codes), corrections, out)
+    written = loops.join_stream(*work, blocks, _pad(codes), corrections, out)
     if written < 0:  # ARRAY-23
         raise FormatError(f"source detail: deflate: {FAULTS[written]}")
     return out[:written].tobytes()
 
 
-def _padded(data: bytes) -> NDArray[np.uint8]:
+def _pad(data: bytes) -> NDArray[np.uint8]:
     return np.frombuffer(data + bytes(SPARE), np.uint8)
 
 

@@ -17,7 +17,7 @@ SHORTEST, LONGEST = 3, 258  # bytes of a match
 N_LITERALS, N_DISTANCES = 288, 32  # symbols of the two codes
 BLOCK_END, FIRST_LENGTH = 256, 257  # symbols
 MOST_BITS = 15  # of a code
-SPARE = 16  # bytes that loops may read, or write as they are, beyond an end
+SPARE = 16  # bytes beyond an end that loops may read, or write unchanged
 
 
 class Codes(NamedTuple):

@@ -51,8 +51,11 @@ class Effort(NamedTuple):
 
 
 class Search(NamedTuple):
-    """A search in ``content``: ``latest`` (WINDOW,) is the last position of each hash, ``earlier``
-    (WINDOW,) the one before each position, ``state`` (4,) where the search stands."""
+    """A search in ``content``.
+
+    ``latest`` (WINDOW,) is the last position of each hash, ``earlier`` (WINDOW,) the previous one
+    of each position, ``state`` (4,) the progress.
+    """
 
     content: Bytes
     latest: Ints
@@ -62,7 +65,7 @@ class Search(NamedTuple):
 
 
 def _insert(search: Search, stop: int) -> None:
-    """Insert the positions before ``stop`` that are not yet."""
+    """Insert all positions before ``stop``."""
     content = search.content
     start = search.state[INSERTED]
     for at in range(start, min(stop, len(content) - 2)):

@@ -125,7 +125,7 @@ class ArrayDetail(Record):
 class Piece:
     """A piece of a file; what does not go with its kind is empty. See ArrayPiece.
 
-    ``part`` are the frame numbers, first and behind the last, that it is of; None: all.
+    ``part``: the first and stop of its frame numbers; None: all.
     """
 
     kind: PieceKind

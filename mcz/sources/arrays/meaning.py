@@ -50,7 +50,7 @@ class ArraySignal:
 
 @dataclass
 class Meaning:
-    """The signals, and of each array in one of them its signal and the channels of its columns."""
+    """Signals made of arrays; ``places``: by array, its signal and the channels of its columns."""
 
     skeleton: Skeleton
     rate: Fraction | None
@@ -67,7 +67,7 @@ class Meaning:
 
 def meaning_of(arrays: Sequence[Array]) -> Meaning:
     """Interpret the arrays of a clip; raises SourceError if none of them is a motion."""
-    body = body_of(arrays)
+    body = find_body(arrays)
     n_frames = body.n_frames if body is not None else frames_of(arrays)
     rate, exact, odd = rate_of(arrays, n_frames)
     skeleton = body.skeleton if body is not None else Skeleton((), angle_unit="")
@@ -126,10 +126,7 @@ def _reasons(arrays: Sequence[Array]) -> list[str]:
 
 
 def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> None:
-    """Add the array that is the motion: joint angles of a robot, else that of the most axes.
-
-    It is the first of several.
-    """
+    """Add the motion: the joint angles of a robot, else the first array with the most axes."""
     fit = [
         (is_robot(array), min(len(array.head.shape), 3), -index)
         for index, array in enumerate(arrays)
@@ -167,7 +164,7 @@ def plain_joints(inner: Sequence[int], name: str) -> tuple[Joint, ...]:
 
 
 def labels(inner: Sequence[int]) -> list[str]:
-    """Names of the numbers of a row: their indices, with blanks between."""
+    """Names of the numbers of a row: their indices, separated by blanks."""
     return [" ".join(map(str, indices)) for indices in product(*map(range, inner))]
 
 
@@ -188,17 +185,14 @@ def _channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...]:
 
 TIMES = ("time", "times", "timestamp", "timestamps")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
-SHAPE = "betas"  # numbers of a body, of which it is said how many there are
-LONGEST = 200  # characters of a word
-EVEN = 1e-6  # of a step: times that are off by less are uniform
+SHAPE = "betas"  # shape parameters of a body: only their number is metadata
+LONGEST = 200  # characters of a text that becomes metadata
+EVEN = 1e-6  # of a step: deviation of times that count as uniform
 _KEY = re.compile(r"[a-z0-9]+")
 
 
 def rate_of(arrays: Sequence[Array], n_frames: int) -> tuple[Fraction | None, bool, list[str]]:
-    """The frame rate, whether that is exactly what the file says, and what is odd about it.
-
-    Of times that are there and are not uniform there is none.
-    """
+    """The frame rate, whether it is exactly as stated, and notes. None if times are not uniform."""
     numbers = (_number(array) for array in arrays if array.name.lower() in RATES)
     stated = next((number for number in numbers if number is not None), None)
     rate, exact = _round(*stated) if stated is not None else (None, True)
@@ -221,7 +215,7 @@ def rate_of(arrays: Sequence[Array], n_frames: int) -> tuple[Fraction | None, bo
 
 
 def _number(array: Array) -> tuple[float, np.dtype[np.generic]] | None:
-    """The only number of an array and its type, None if it is none of a rate."""
+    """The single number of an array and its type; None if it cannot be a rate."""
     if array.words is None or array.words.size != 1:
         return None
     value = float(array.words.ravel()[0])
@@ -229,7 +223,7 @@ def _number(array: Array) -> tuple[float, np.dtype[np.generic]] | None:
 
 
 def _round(value: float, dtype: np.dtype[np.generic]) -> tuple[Fraction, bool]:
-    """The simplest rate that is this number in its type, and whether it is exactly that."""
+    """The simplest rate that rounds to ``value`` in its type, and whether it is exact."""
     exact = Fraction(value)
     for unit in UNITS:
         rate = round(exact / unit) * unit
@@ -253,7 +247,7 @@ def facts_of(arrays: Sequence[Array]) -> dict[str, str]:
 
 
 def _text(array: Array) -> str | None:
-    """A single word or number as text, None of all else."""
+    """A single word or number as text; None for any other array."""
     if array.words is not None:
         if array.words.size != 1 or len(array.head.shape) > 1:
             return None
@@ -265,7 +259,7 @@ def _text(array: Array) -> str | None:
 
 
 WHOLE = ("poses", "fullpose", "full_pose")  # all joints
-PLACES = ("trans", "transl")  # where the root is
+PLACES = ("trans", "transl")  # position of the root
 ROOT, BODY = ("root_orient", "global_orient"), ("pose_body", "body_pose")
 FACE = (("pose_jaw", "jaw_pose"), ("pose_eye",), ("leye_pose",), ("reye_pose",))
 HANDS = (("pose_hand",), ("left_hand_pose",), ("right_hand_pose",))
@@ -274,13 +268,16 @@ BODY_SIZES = {63: "smplh", 69: "smpl"}  # numbers of a body without its root, an
 WITHOUT_HANDS = 22  # joints that SMPL-H and SMPL-X share
 POSITION = 3  # channels of the root before its rotation
 WITH_FACE = 165  # numbers of SMPL-X
-PARTS = {**dict.fromkeys(ROOT, 0), **dict.fromkeys(BODY, 3)}  # where parts of all joints begin
+PARTS = {
+    **dict.fromkeys(ROOT, 0),
+    **dict.fromkeys(BODY, 3),
+}  # first number of each part in a whole pose
 FACES = {"pose_jaw": 66, "jaw_pose": 66, "pose_eye": 69, "leye_pose": 69, "reye_pose": 72}
 
 
 @dataclass(frozen=True, slots=True)
 class ArrayBody:
-    """The motion signal of a body: ``words`` side by side, and where columns of arrays are."""
+    """The motion of a body: ``words`` side by side; ``places``: the columns of each array."""
 
     skeleton: Skeleton
     n_frames: int
@@ -288,8 +285,8 @@ class ArrayBody:
     places: dict[int, Sequence[int]]
 
 
-def body_of(arrays: Sequence[Array]) -> ArrayBody | None:
-    """The body that the arrays of a file speak of, None if they do not."""
+def find_body(arrays: Sequence[Array]) -> ArrayBody | None:
+    """The body whose pose the arrays hold; None if they hold no pose."""
     named = {
         array.name: index
         for index, array in reversed([*enumerate(arrays)])
@@ -317,7 +314,7 @@ def body_of(arrays: Sequence[Array]) -> ArrayBody | None:
 
 
 def _pose_parts(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:
-    """The arrays of parts that are the joints of a model in its order, [] if there are none."""
+    """The arrays that together are the joints of a model, in order; [] if there are none."""
     root, body = (next((named[n] for n in names if n in named), None) for names in (ROOT, BODY))
     if root is None or body is None or arrays[root].numbers.shape[1] != 3:
         return []
@@ -335,7 +332,7 @@ def _pose_parts(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:
 
 
 def _model(n_numbers: int) -> BodyTree | None:
-    """The model, or the first joints of one, that has so many rotation vectors."""
+    """The model, perhaps only its first joints, with rotation vectors of ``n_numbers`` numbers."""
     n_joints, rest = divmod(n_numbers, 3)
     if rest:
         return None
@@ -364,11 +361,11 @@ def _repeated_parts(
             continue
         part = arrays[index].numbers
         stop = at + part.shape[1]
-        if stop <= words.shape[1] and _same(words[:, at:stop], part):
+        if stop <= words.shape[1] and _is_equal(words[:, at:stop], part):
             yield index, range(first + at, first + stop)
 
 
-def _same(one: Items, other: Items) -> bool:
+def _is_equal(one: Items, other: Items) -> bool:
     """Return True if two arrays have the same type and bits."""
     if one.dtype != other.dtype or one.shape != other.shape:
         return False

@@ -1,4 +1,4 @@
-"""Opcodes of a pickle -> plain data and arrays. Nothing is imported, called or made of a class.
+"""Opcodes of a pickle -> plain data and arrays. It imports, calls and instantiates nothing.
 
 A pickle is a program for a stack machine. This one runs the opcodes that build data; the names of
 NumPy and joblib below stand for arrays, and every other name is refused. ``pickletools`` has the
@@ -71,7 +71,7 @@ VIEW = "a view of a storage, or one of several tensors of it"
 
 
 class Machine:
-    """The pickle in ``data`` from ``at`` on; ``at`` moves behind it.
+    """The pickle in ``data`` from ``at`` on; ``at`` moves to its end.
 
     ``frames`` are the frames of protocol 4: offset of the length, start and stop. ``storages`` are
     those of tensors by their key, in the byte order ``order``; None: there are no tensors.
@@ -147,7 +147,7 @@ class Machine:
         return items
 
     def text_of(self, value: object) -> str | None:
-        """A short text, None of anything else."""
+        """A short text; None for anything else."""
         if isinstance(value, Raw) and value.is_text and value.stop - value.start <= MAX_WORD:
             return self.data[value.start : value.stop].decode("latin-1")
         return value if isinstance(value, str) and len(value) <= MAX_WORD else None
@@ -271,9 +271,9 @@ class Machine:
                 target.order = self.text_of(order) or ""
                 if not subtype is names is fields is None:  # arrays in arrays, or a structure
                     target.code = "V"
-            case PickledArray(), (_, tuple() as shape, DType() as dtype, by_columns, content):
+            case PickledArray(), (_, tuple() as shape, DType() as dtype, is_fortran, content):
                 target.shape, target.dtype = shape, dtype
-                target.by_columns = by_columns is True or integer_of(by_columns) == 1
+                target.is_fortran = is_fortran is True or integer_of(is_fortran) == 1
                 target.content = content if isinstance(content, Raw | list) else None
                 target.fault = AS_TEXT
             case Wrapper(), Dict():
@@ -283,7 +283,7 @@ class Machine:
                 self.refuse("a state is set on something other than an array")
 
     def _read_wrapped(self, state: Dict) -> PickledArray:
-        """The array whose bytes joblib puts behind its wrapper, after some for alignment."""
+        """The array whose bytes joblib puts after its wrapper and some padding."""
         if len(state.pairs) > MAX_STATE:
             self.refuse("a joblib wrapper has too many fields")
         known = {self.text_of(key): value for key, value in state.pairs if self.text_of(key)}

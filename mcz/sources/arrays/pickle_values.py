@@ -21,7 +21,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Raw:
-    """Bytes that stand in the file, behind their length of ``count_size`` bytes, 0 without one.
+    """Bytes of the file, after their length of ``count_size`` bytes (0: without).
 
     ``is_text``: a string of Python 2, which may be text.
     """
@@ -56,7 +56,7 @@ class PickledArray:
 
     shape: tuple[object, ...] = ()
     dtype: DType | None = None
-    by_columns: bool = False
+    is_fortran: bool = False
     content: Raw | list[object] | None = None
     fault: str = ""
     items: Number | None = None
@@ -88,14 +88,14 @@ class Wrapper:
 
 
 def integer_of(value: object) -> int:
-    """The integer of an opcode, -1 of anything else."""
+    """The integer of an opcode; -1 for anything else."""
     if isinstance(value, Number):
         return value.value
     return value if type(value) is int else -1
 
 
 def size_of(shape: Sequence[int], itemsize: int) -> int | None:
-    """Bytes of an array, None of a shape that is none."""
+    """Bytes of an array; None for an invalid shape."""
     is_shape = all(0 <= length <= MAX_LENGTH for length in shape)
     return prod(shape) * itemsize if is_shape else None
 

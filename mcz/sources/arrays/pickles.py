@@ -1,6 +1,6 @@
-"""Arrays, texts and numbers of a pickle, by their keys; nothing of it is ever run.
+"""Arrays, texts and numbers of a pickle by their keys, without running it.
 
-SPEC.md, "The bytes of arrays", says what a template has of one; ``pickle_machine`` reads opcodes.
+SPEC.md, "The bytes of arrays", defines its template; ``pickle_machine`` reads opcodes.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def _read_machine(machine: Machine) -> Pickle:
     for shared in filter(lambda tensors: len(tensors) > 1, machine.tensors.values()):
         for tensor in shared:
             tensor.content = None
-    reader = _Reader(machine, _clips(machine, root))
+    reader = _Collector(machine, _clips(machine, root))
     arrays, fields = reader.read(root)
     fields += [
         ArchiveField(field, PieceKind.SIZE8, start, stop) for field, start, stop in machine.frames
@@ -134,7 +134,9 @@ def _read_machine(machine: Machine) -> Pickle:
 def _children(machine: Machine, node: object) -> list[tuple[str, object]]:
     """The values of a dictionary by their keys; what a list or an array of objects nests."""
     if isinstance(node, Dict):
-        named = ((machine.text_of(key), _unwrapped(machine, value)) for key, value in node.pairs)
+        named = (
+            (machine.text_of(key), _unwrap_poselib(machine, value)) for key, value in node.pairs
+        )
         return [*{key: value for key, value in named if key}.items()]
     items = node.content if isinstance(node, PickledArray) else node
     if not isinstance(items, list | tuple):
@@ -142,8 +144,8 @@ def _children(machine: Machine, node: object) -> list[tuple[str, object]]:
     return [(str(n), value) for n, value in enumerate(items) if isinstance(value, NESTS)]
 
 
-def _unwrapped(machine: Machine, value: object) -> object:
-    """The array in a dictionary that poselib makes of it, any other value as it is."""
+def _unwrap_poselib(machine: Machine, value: object) -> object:
+    """The array in a dictionary of poselib; any other value unchanged."""
     if isinstance(value, Dict) and len(value.pairs) == 2:
         parts = {machine.text_of(key): part for key, part in value.pairs}
         if parts.keys() == {"arr", "context"} and isinstance(parts["arr"], PickledArray):
@@ -184,8 +186,8 @@ def _clips(machine: Machine, root: object) -> set[int]:
     return clips if max(keys.values(), default=0) > 1 else set()
 
 
-class _Reader:
-    """The arrays below a value, each once and with the bytes that are its own.
+class _Collector:
+    """Collects the arrays below a value, each once, with its bytes.
 
     ``members`` are those of each dictionary among ``clips``.
     """
@@ -272,11 +274,11 @@ class _Reader:
         is_big = order == ">"
         items = node.items
         items_at = (items.at, items.at + items.size) if items is not None else (0, 0)
-        head = NpyHead(raw.start, shape, code, is_big, node.by_columns, rows_at)
+        head = NpyHead(raw.start, shape, code, is_big, node.is_fortran, rows_at)
         return replace(head, is_printed=False, items_at=items_at), ""
 
     def _add_words(self, name: str, node: object) -> bool:
-        """Add a list of texts, such as names of joints; returns False for anything else."""
+        """Add a list of texts, such as joint names; return False for anything else."""
         if not name or not isinstance(node, list | tuple) or not node:
             return False
         texts = [self.machine.text_of(value) for value in node]
@@ -315,7 +317,7 @@ def _array_of_texts(name: str, words: Sequence[str], shape: tuple[int, ...]) -> 
 
 
 def npy_objects(data: bytes) -> Pickle | None:
-    """The pickle in an NPY file of objects, None of a file of anything else."""
+    """The pickle in an NPY file of objects; None for other files."""
     head = read_head(data, 0, len(data)) if data.startswith(MAGIC) else NpyHead()
     return read_pickle(data, head.start) if head.code == "O" else None
 

@@ -59,7 +59,7 @@ def restore_arrays(motion: Motion) -> bytes:
     n_columns = sum(piece.n_columns for piece in parsed)
     if n_columns > MAX_COLUMNS:
         raise LimitError(f"source template: {n_columns} columns, limit {MAX_COLUMNS}")
-    pieces = _deflated(parsed, stored)
+    pieces = _restore_streams(parsed, stored)
     starts = _starts(pieces, stored)
     out = bytearray(starts[-1])
     for piece, at, stop in zip(pieces, starts, starts[1:], strict=False):
@@ -112,7 +112,7 @@ def _starts(pieces: Sequence[Piece], stored: _Stored) -> list[int]:
     return starts
 
 
-def _deflated(pieces: Sequence[Piece], stored: _Stored) -> Sequence[Piece]:
+def _restore_streams(pieces: Sequence[Piece], stored: _Stored) -> Sequence[Piece]:
     """``pieces`` with the stream itself as the text of each DEFLATE piece."""
     if n_file_pieces(pieces) == len(pieces):
         return pieces
@@ -326,7 +326,7 @@ def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
             high += 1
         after = data[head.rows_at[1] : head.end]
         count = replace(count, kind=PieceKind.COUNT, after=after, size=high - low)
-    flags = BIG_ENDIAN * head.big_endian + BY_COLUMNS * head.by_columns
+    flags = BIG_ENDIAN * head.big_endian + BY_COLUMNS * head.is_fortran
     order = file_columns(head)
     channels = [array.channels[column] for column in order.tolist()]
     numbers = Piece(

@@ -1,7 +1,7 @@
 """Skeletons of arrays: of robots, of body models (annex ``body_trees.json``), of callers.
 
-Lengths of bones are not included: ``body_models`` takes them from a model file of the user's own,
-or from positions of a data set.
+Bone lengths are not included: ``body_models`` takes them from a model file, or from positions of a
+data set.
 """
 
 from __future__ import annotations

@@ -182,7 +182,7 @@ def _first(data: bytes, parameters: Parameters) -> int:
 
 
 def _with_rotations(data: bytes, shape: DataShape, parameters: Parameters) -> DataShape:
-    """The shape with the rotations that ROTATION declares, if all of them are there."""
+    """The shape with the rotations that ROTATION declares, if all are present."""
     used, block, ratio = (
         parameters.count("ROTATION", name) for name in ("USED", "DATA_START", "RATIO")
     )
@@ -201,7 +201,7 @@ def _notes(
     data: bytes, shape: DataShape, counts: list[int], parameters: Parameters, order: ByteOrder
 ) -> Iterator[str]:
     """Notes on oddities of the file."""
-    if shape.n_frames > MAX_COUNT:  # a word that stays at its end says what it can
+    if shape.n_frames > MAX_COUNT:  # a word that cannot hold the count has its largest value
         counts = [count for count in counts if count > MAX_COUNT]
     if any(count != shape.n_frames for count in counts):
         declared = " or ".join(str(count) for count in dict.fromkeys(counts))
@@ -295,7 +295,7 @@ def field_bytes(
 
 
 def _section(motion: Motion, layout: C3dLayout) -> bytes:
-    """The data section: of every frame the points, then the samples of the analog channels."""
+    """The data section: for every frame the points, then the samples of analog channels."""
     n_frames, end = motion.n_frames, 4 * layout.n_points
     n_analog = layout.n_channels * layout.subframes
     words = np.empty((n_frames, end + n_analog), f"{layout.order.prefix}u{layout.word}")
@@ -373,7 +373,7 @@ def _residuals(motion: Motion, layout: C3dLayout, parts: list[Signal]) -> Signal
 def _with_gaps(points: Signal, residuals: Values) -> Signal:
     """The points, NaN if they are invalid and neither they nor their residuals say so.
 
-    A lossy codec fills such gaps, which the file would then no longer have.
+    A lossy codec fills such gaps; without NaN the file would lose them.
     """
     valid = valid_points(points)
     if valid is None:

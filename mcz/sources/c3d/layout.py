@@ -27,7 +27,7 @@ from mcz.sources.c3d.parameters import (
 
 FORMAT, OUTPUTS_FORMAT = "c3d", "c3d-outputs"  # names in the registry of source formats
 MAX_ZEROS = 2**20  # that a detail counts instead of holding them
-MAX_SHARED_TAIL = 512  # bytes behind the data that are the clip's own; more go into the template
+MAX_SHARED_TAIL = 512  # bytes after the data that belong to the clip; more go into the template
 
 
 class FieldKind(IntEnum):
@@ -106,7 +106,7 @@ class C3dDetail(Record):
 class C3dLayout:
     """A template and a detail, parsed; see C3dTemplate and C3dDetail.
 
-    ``head`` here has the fields in place; ``tail`` is all that lies behind the data; ``outputs`` is
+    ``head`` here has the fields in place; ``tail`` is all that follows the data; ``outputs`` is
     that of C3dOutputsTemplate, () if all points are points.
     """
 

@@ -109,12 +109,12 @@ class Parameters:
         return float(parameter.data[0])
 
     def count(self, group: str, name: str) -> int | None:
-        """The first number of a parameter if it is a count, None if it is none."""
+        """The first number of a parameter, None if it is no count."""
         value = self.number(group, name)
         return int(value) if value is not None and 0 <= value < 2**32 else None
 
     def texts(self, group: str, name: str) -> list[bytes]:
-        """The texts of a parameter and of those that go on with it (LABELS, LABELS2, ...)."""
+        """The texts of a parameter and of its continuations (LABELS, LABELS2, ...)."""
         texts: list[bytes] = []
         number = 1
         while True:
@@ -127,7 +127,7 @@ class Parameters:
             number += 1
 
     def numbers(self, group: str, name: str) -> list[float]:
-        """The numbers of a parameter and of those that go on with it, integers with a sign."""
+        """The numbers of a parameter and of its continuations; integers are signed."""
         numbers: list[float] = []
         count = 1
         while True:
@@ -201,7 +201,7 @@ def find_parameters(data: bytes) -> tuple[ByteOrder, int]:
 
 def parse_parameters(data: bytes, order: ByteOrder, start: int) -> Parameters:
     """The parameters of the section at ``start``, whose first four bytes are there."""
-    blocks = data[start + 2] or MAX_BLOCKS  # some files have more of them than they say
+    blocks = data[start + 2] or MAX_BLOCKS  # some files have more of them than they state
     data_start = (order.integer(data, WORD_OF_START) - 1) * BLOCK
     stop = min(max(start + blocks * BLOCK, data_start), start + MAX_BLOCKS * BLOCK, len(data))
     groups: dict[int, str] = {}
@@ -232,7 +232,7 @@ def parse_parameters(data: bytes, order: ByteOrder, start: int) -> Parameters:
 
 
 def _parameter(data: bytes, at: int, stop: int) -> C3dParameter | None:
-    """The parameter whose type stands at ``at``, None if it does not fit its section."""
+    """The parameter whose type is at ``at``, None if it exceeds its section."""
     if at + 2 > stop:
         return None
     kind, n_dims = struct.unpack_from("bB", data, at)
@@ -247,7 +247,7 @@ def _parameter(data: bytes, at: int, stop: int) -> C3dParameter | None:
 
 
 OUTPUTS = "outputs"
-UNITS_OF = {  # parameters of POINT that list outputs, and the one that holds their unit
+UNITS_OF = {  # parameters of POINT that list outputs, and the parameter with their unit
     "ANGLES": "ANGLE_UNITS",
     "FORCES": "FORCE_UNITS",
     "MOMENTS": "MOMENT_UNITS",
@@ -255,7 +255,7 @@ UNITS_OF = {  # parameters of POINT that list outputs, and the one that holds th
     "SCALARS": "SCALAR_UNITS",
 }
 PARTS = ("x", "y", "z")
-USUAL = (  # units, and the list in which they usually are
+USUAL = (  # units, and the usual list of outputs in each
     (r"(?i)deg|rad|°", "ANGLES"),
     (r"N.?m", "MOMENTS"),
     (r"N\b", "FORCES"),
@@ -298,7 +298,7 @@ def split_of(runs: Sequence[int], n_points: int) -> Split:
 
 
 def find_outputs(parameters: Parameters, n_points: int) -> Split:
-    """Outputs are the points, all of them, whose label one of the lists has; see ``groups_of``."""
+    """The outputs: all points with a label in one of the lists; see ``groups_of``."""
     labels = parameters.texts("POINT", "LABELS")[:n_points]
     groups = groups_of(parameters)
     is_output = np.zeros(n_points, np.bool_)

@@ -46,8 +46,8 @@ MOST_RATE = 1e30  # of frames: the samples of one second fit a binary32, too
 def plain_c3d(motion: Motion) -> Motion:
     """``motion`` on the grids of a C3D file, with the source of a plain one.
 
-    Outputs of models follow the points. Raises MotionError for joints that are no markers, signals
-    other than residuals, analog and outputs, and whatever is too much for C3D.
+    Model outputs follow the points. Raises MotionError for joints that are no markers, for signals
+    other than residuals, analog and outputs, and for sizes beyond C3D.
     """
     for joint in motion.skeleton.joints:
         if joint.parent >= 0 or tuple(c.kind for c in joint.channels) != POSITION_KINDS:

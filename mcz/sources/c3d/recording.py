@@ -63,7 +63,7 @@ class AnalogChannel:
 
 @dataclass(frozen=True, slots=True)
 class ForcePlatform:
-    """A force platform of a C3D file; what the file does not say of it is () or None.
+    """A force platform of a C3D file; facts that the file lacks are () or None.
 
     ``type`` is that of FORCE_PLATFORM:TYPE (1 to 7, ...). ``corners`` are four, in the length unit
     and the axes of the points; ``origin`` is in the length unit and the axes of the platform.
@@ -82,11 +82,11 @@ class ForcePlatform:
 class Recording:
     """Recording metadata of a C3D file, unconverted.
 
-    ``first_frame`` is the number of its first frame. ``unit`` is that of the points' coordinates
-    and ``analog_rate`` in samples a second, "" and None while unknown. ``general_scale`` is part of
-    what every analog word means. ``x_screen`` and ``y_screen`` are the axes that point right and up
-    on a screen, as printed ("+X", "-Z"), "" while unknown. ``zero_frames`` are the frames, from 1
-    on, in which no platform is loaded, None if the file does not say so.
+    ``first_frame`` is the number of its first frame. ``unit`` is that of the points' coordinates,
+    "" if unknown; ``analog_rate`` is in samples a second, None if unknown. ``general_scale`` is
+    part of what every analog word means. ``x_screen`` and ``y_screen`` are the axes that point
+    right and up on a screen, as printed ("+X", "-Z"), "" if unknown. ``zero_frames`` are the
+    frames, from 1 on, in which no platform is loaded, None if the file does not say so.
     """
 
     first_frame: int
@@ -169,7 +169,7 @@ def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | 
 
 
 def _parameters(layout: C3dLayout) -> Parameters:
-    """The parameter section, which lies before the data or behind it; without one, none."""
+    """The parameter section, before or after the data; empty if there is none."""
     head = layout.head
     none = Parameters(layout.order, 0, {}, 0)
     if len(head) < BLOCK:
@@ -215,7 +215,7 @@ def _channels(parameters: Parameters, n: int) -> Iterator[AnalogChannel]:
 
 
 def _offset(parameters: Parameters, number: float) -> float:
-    """An offset with the sign that is meant: as the words, it has none if they have none.
+    """An offset, signed if the words are.
 
     -32768 is the middle of 16 bits without a sign, whatever ANALOG:FORMAT says.
     """
@@ -267,7 +267,7 @@ def _dimensions(parameters: Parameters, name: str) -> tuple[int, int]:
 
 
 def _item(numbers: Sequence[float], index: int, size: int) -> Sequence[float]:
-    """Item ``index`` of ``size`` numbers, empty if not all of them are there."""
+    """Item ``index`` of ``size`` numbers; empty if it is incomplete."""
     item = numbers[index * size : (index + 1) * size]
     return item if len(item) == size else []
 
@@ -285,7 +285,7 @@ def _zero_frames(parameters: Parameters) -> tuple[int, int] | None:
     return (first, last) if 0 < first <= last else None
 
 
-KEY = 12_345  # says that labels in the header have four characters
+KEY = 12_345  # states that labels in the header have four characters
 WORD_OF_KEY, WORD_OF_COUNT = 298, 300  # offsets in the header
 TIMES, LABELS = 304, 396
 MOST = 18  # events in a header

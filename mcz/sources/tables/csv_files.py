@@ -1,7 +1,7 @@
-"""CSV files: which kind one is, and the way to its reader.
+"""CSV files: find the kind of a file, and call its reader.
 
-The suffix .csv says little. A Motive file says its format version, one of Vicon has the columns
-Frame and Sub Frame, and all others are columns of numbers, or no table of them.
+A Motive file states its format version, a Vicon file has the columns Frame and Sub Frame; any other
+is a table of numbers, or is refused.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from mcz.sources.text.source import (
 
 SNIFFED = 2**16  # bytes at the start that tell the kind
 NAMES = ("csv", "motive", "vicon")
-MOST_RETURNS = 1024  # carriage returns that are looked at
+MOST_RETURNS = 1024  # most carriage returns to examine
 
 _RETURN = re.compile(rb"\r(?=[^\r\n])")
 
@@ -89,7 +89,7 @@ def is_motion(data: bytes) -> bool:
 
 
 def _lines(data: bytes) -> list[tuple[int, bytes]]:
-    """The lines at the start of ``data`` that are looked at, without one that is cut off."""
+    """The lines at the start of ``data`` that are examined, without a partial one."""
     start = data[:SNIFFED]
     whole = start if len(data) < SNIFFED else start[: start.rfind(b"\n") + 1]
     return whole_cells(lines_from(whole, 0))
@@ -236,9 +236,9 @@ def _scalars(head: _Head, values: Sequence[int]) -> Skeleton:
 
 
 def _markers(head: _Head, values: Sequence[int]) -> Skeleton | None:
-    """Markers if all columns are x, y and z of them, such as LASI.x, LASI.y, LASI.z.
+    """The markers if all columns are their x, y and z, such as LASI.x, LASI.y, LASI.z.
 
-    None if one is not, and if a name or unit says that it is of no position.
+    None if one is not, or if a name or unit excludes positions.
     """
     joints, units = [], set()
     for k in range(0, len(values), 3):

@@ -18,7 +18,7 @@ NO_NUMBER = (
 NOT_THERE = (b"", *NO_NUMBER)
 MOST_CELLS = MOST_CHANNELS
 BLANK_CELLS = b' \t\r\n,;"'  # bytes of cells that say nothing
-LOOKED_AT = 64  # lines in which rows of numbers have to begin
+LOOKED_AT = 64  # rows of numbers begin within so many lines
 COMMENTS = (b"#", b"%", b"//")  # how lines begin that are neither names nor rows
 
 _NUMBER = re.compile(
@@ -94,20 +94,20 @@ def is_blank(line: bytes) -> bool:
 
 
 def count_columns(heads: Sequence[Sequence[str]], rows: bytes, separator: bytes | None) -> int:
-    """The number of columns of a table: up to the last cell that is not blank in any line.
+    """The number of columns of a table: up to the last cell that some line fills.
 
     ``heads``: the cells of the lines above the rows. Spreadsheets fill all lines up to one width,
-    so a blank cell at the end of a line is no column. Beyond the heads, all rows are looked at,
-    if the first one has more cells.
+    so a blank cell at the end of a line is no column. If the first row has more cells than the
+    heads, all rows are examined.
     """
-    named = max((_filled(cells) for cells in heads), default=0)
+    named = max((_count_filled(cells) for cells in heads), default=0)
     if len(cells_of(rows[: rows.find(b"\n") + 1 or len(rows)], separator)) <= named:
         return named
-    filled = (_filled(cells_of(line, separator)) for line in rows.split(b"\n"))
+    filled = (_count_filled(cells_of(line, separator)) for line in rows.split(b"\n"))
     return max(named, *filled)
 
 
-def _filled(cells: Sequence[str] | Sequence[bytes]) -> int:
+def _count_filled(cells: Sequence[str] | Sequence[bytes]) -> int:
     """The number of cells up to the last one that is not blank."""
     return next((k for k in range(len(cells), 0, -1) if cells[k - 1]), 0)
 
@@ -134,9 +134,9 @@ def first_row(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes | None, in
 
 
 def _first_like(lines: Sequence[tuple[int, bytes]], number: int, separator: bytes) -> int:
-    """The first of the rows that end with line ``number``, some of whose cells may be texts.
+    """The first of the rows that end with line ``number``; cells may be texts.
 
-    Right below a line of names alone, all lines with numbers are rows: a word may stand for one.
+    Right below a line of names, all lines with numbers are rows: a word may replace a number.
     """
     cells = cells_of(lines[number][1], separator)
     above = [_some_cells(line, separator) for _, line in lines[:number]]
@@ -178,15 +178,15 @@ def _first_numbers(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes | Non
 
 
 def _are_names(lines: Sequence[tuple[int, bytes]], separator: bytes | None, n_cells: int) -> bool:
-    """Return whether one line is given, of ``n_cells`` names and no number."""
+    """Return True for a single line of ``n_cells`` names and no number."""
     cells = [cell for _, line in lines for cell in _some_cells(line, separator)]
     return len(cells) == n_cells and all(cells[1:]) and not any(map(_is_number, cells))
 
 
 def _last_row(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes, int] | None:
-    """The last line that is looked at, if it has numbers among its cells, and names or rows above.
+    """The last examined line, if it has numbers among its cells, and names or rows above.
 
-    A column of text has no line of numbers alone, and the last line is the least likely header.
+    With a column of text no line has only numbers; the last one is the least likely header.
     """
     looked_at = [k for k, (_, line) in enumerate(lines[:LOOKED_AT]) if not is_blank(line)]
     if len(looked_at) < 2:

@@ -33,12 +33,12 @@ from mcz.sources.text.layout import (
     Detail,
     FrameLayout,
     PatternFields,
-    numbered_patterns,
-    parsed_patterns,
+    number_patterns,
+    parse_patterns,
 )
 
 NAME, NEXT, SAME, COUNT = b"\0", b"\1", b"\2", b"\3"  # marks of a header
-PHRASES = {  # and others: what stands in many headers
+PHRASES = {  # marks of phrases that are common in headers
     4: b"PathFileType\t4\t(X/Y/Z)\t",
     5: b"DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\t"
     b"OrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
@@ -67,7 +67,7 @@ PHRASES = {  # and others: what stands in many headers
     31: b",Total Exported Frames,",
 }
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54, "ft": 30.48}  # as headers name units
-MOST = 2**62  # of ordinals, so that they fit an int64
+MOST_ORDINAL = 2**62  # bound of ordinals, which then fit int64
 MAX_HEADER = 2**26  # bytes of a header with its marks filled
 MAX_SECTIONS = 64  # TABLE-07
 DECIMALS = (GridKind.FIXED, GridKind.TRIMMED)  # of times that follow from frame numbers
@@ -139,21 +139,21 @@ class Clock:
     def ordinals(self, numbers: Sequence[int]) -> list[int]:
         """The ordinal of every time; FormatError for one far beyond every grid."""
         ordinals = [(n * self.numerator + self.offset) // self.denominator for n in numbers]
-        if any(abs(ordinal) > MOST for ordinal in ordinals):
+        if any(abs(ordinal) > MOST_ORDINAL for ordinal in ordinals):
             raise FormatError("source template: a time is no number of its grid")
         return ordinals
 
-    def frames_a_second(self, rate: Fraction | None) -> Fraction | None:
-        """The frame numbers in a second of this clock; None of times that stand still."""
+    def numbers_per_second(self, rate: Fraction | None) -> Fraction | None:
+        """Frame numbers per second of this clock; None if its times do not change."""
         if not self.numerator:
             return None
-        unit = Fraction(10**self.grid.digits) * int(self._per_second(rate))
+        unit = Fraction(10**self.grid.digits) * int(self._units_per_second(rate))
         return unit * self.denominator / self.numerator
 
-    def _per_second(self, rate: Fraction | None) -> float:
-        """1, or 1000, 10^6 or 10^9, whichever is nearest to the printed units a frame, in frames.
+    def _units_per_second(self, rate: Fraction | None) -> float:
+        """The power of 1000, up to 10^9, nearest to the printed units of a second.
 
-        Of a rate that is unknown, and of times that stand still: 1.
+        1 for an unknown rate, and for times that do not change.
         """
         if rate is None or not self.numerator:
             return 1.0
@@ -177,10 +177,10 @@ class Section:
 
 
 def build_table(sections: Sequence[Section]) -> tuple[bytes, bytes]:
-    """The bytes of the template and of the detail; LimitError for too many runs."""
+    """Build the template and the detail; raises LimitError for too many runs."""
     templates, details = [], []
     for section in sections:
-        shared, own = numbered_patterns(section.rows.patterns)
+        shared, own = number_patterns(section.rows.patterns)
         templates.append(
             SectionFields(
                 signals=list(section.signals),
@@ -206,21 +206,21 @@ def parse_sections(template: bytes, detail: bytes, sizes: Sequence[int]) -> list
     numbers = [number for fields in shared for number in fields.signals]
     if max(numbers, default=0) >= len(sizes) or len(set(numbers)) < len(numbers):  # TABLE-08
         raise FormatError(f"source template: signals {numbers[:8]} of {len(sizes)}")
-    return [_section(*fields, sizes) for fields in zip(shared, own, strict=False)]
+    return [_section(*fields, sizes) for fields in zip(shared, own, strict=True)]
 
 
 def _section(shared: SectionFields, detail: Detail, sizes: Sequence[int]) -> Section:
     if not shared.signals:  # TABLE-08
         raise FormatError("source template: a section without signals")
-    clock = parsed_clock(shared)
+    clock = parse_clock(shared)
     n_columns = sum(sizes[number] for number in shared.signals) + 1 + bool(shared.clock)  # TABLE-01
-    rows = parsed_patterns((shared.header,), shared, detail, n_columns)
+    rows = parse_patterns((shared.header,), shared, detail, n_columns)
     signals = tuple(shared.signals)
     return Section(signals, shared.header, bool(shared.marks), shared.missing, clock, rows)
 
 
-def parsed_clock(shared: SectionFields) -> Clock | None:
-    """The clock of a section, None if it has none; FormatError for a grid without decimals."""
+def parse_clock(shared: SectionFields) -> Clock | None:
+    """The clock of a section, None without one; FormatError for a grid without decimals."""
     fields = shared.clock
     if fields is None:
         return None
@@ -230,7 +230,7 @@ def parsed_clock(shared: SectionFields) -> Clock | None:
 
 
 def fill_marks(header: bytes, names: Sequence[str], count: bytes) -> bytes:
-    """``header`` with its marks replaced; FormatError if there are more than joints."""
+    """``header`` with its marks replaced; FormatError for more name marks than names."""
     out, at, size = [], 0, len(header)
     joint = number = 0
     for match in _MARKS.finditer(header):
@@ -239,7 +239,7 @@ def fill_marks(header: bytes, names: Sequence[str], count: bytes) -> bytes:
             joint += 1
             if joint > len(names):  # TABLE-05
                 raise FormatError(f"source template: a name of joint {joint} of {len(names)}")
-            text = "".join(names[joint - 1 : joint]).encode()
+            text = names[joint - 1].encode()
         elif mark == COUNT:
             text = count
         elif mark in (NEXT, SAME):
@@ -255,11 +255,11 @@ def fill_marks(header: bytes, names: Sequence[str], count: bytes) -> bytes:
     return b"".join((*out, header[at:]))
 
 
-def with_phrases(header: bytes) -> bytes:
+def mark_phrases(header: bytes) -> bytes:
     """``header`` with a mark for each phrase."""
     return _PHRASES.sub(lambda match: _MARK_OF[match[0]], header)
 
 
-def any_mark(header: bytes) -> bool:
-    """Return True if ``header`` has a byte that would be read as a mark."""
+def has_mark(header: bytes) -> bool:
+    """Return True if ``header`` has a byte that readers take for a mark."""
     return _MARKS.search(header) is not None

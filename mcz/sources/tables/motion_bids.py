@@ -55,7 +55,7 @@ def with_side_files(motion: Motion, path: Path) -> Motion:
 
 
 def _find(path: Path, suffix: str) -> Path | None:
-    """The nearest side file whose entities are all among those of ``path``; of several, most."""
+    """The nearest side file with no entity that ``path`` lacks; of several, that with most."""
     stem = path.name.removesuffix(MOTION_SUFFIX)
     own_side = path.with_name(stem + suffix)
     if own_side.is_file():  # the usual case, of all entities
@@ -63,7 +63,9 @@ def _find(path: Path, suffix: str) -> Path | None:
     entities = frozenset(stem.split("_"))
     for folder in path.absolute().parents[: 1 + LEVELS]:
         fit = [
-            side for own, side in _side_files(folder, suffix, _modified(folder)) if own <= entities
+            side
+            for own, side in _side_files(folder, suffix, _modification_time(folder))
+            if own <= entities
         ]
         most = [side for side in fit if side.name.count("_") == fit[0].name.count("_")]
         if len(most) > 1:
@@ -73,7 +75,7 @@ def _find(path: Path, suffix: str) -> Path | None:
     return None
 
 
-def _modified(folder: Path) -> int:
+def _modification_time(folder: Path) -> int:
     try:
         return folder.stat().st_mtime_ns
     except OSError:

@@ -1,7 +1,7 @@
 """CSV files of Motive (OptiTrack), format version 1.2x: bytes -> Motion.
 
-SPEC.md, "The text of tables", is normative for the way back. Every rigid body, bone and marker is
-a joint: with its rotation and position, and with what the file says of their quality.
+SPEC.md, "The text of tables", is normative for the way back. Every rigid body, bone and marker is a
+joint, with its rotation, position and quality.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ UNITS = {
     "inches": 2.54,
     "feet": 30.48,
 }
-LOCAL = ("local", "parent")  # coordinate spaces in which a bone is seen from its parent
+LOCAL = ("local", "parent")  # coordinate spaces relative to the parent of a bone
 QUATERNION = {"qx", "qy", "qz", "qw"}
 MAX_HEAD = 32  # lines above the rows
 
@@ -226,7 +226,7 @@ def _channel(quantity: str, axis: str, *, euler: bool) -> Channel:
 
 
 def _sort_rotations(one: _Object, order: str) -> None:
-    """Put the angles of Euler into the order in which they turn."""
+    """Sort Euler angles by the order of their rotations."""
     places = [k for k, channel in enumerate(one.channels) if channel.kind[:1] == "r"]
     turned = sorted(places, key=lambda k: order.index(one.channels[k].kind[1]))
     columns, channels = one.columns.copy(), one.channels.copy()

@@ -55,7 +55,7 @@ from mcz.sources.text.source import (
 )
 
 MOST_BYTES = 2**24  # of a header, without the frames of calibration
-MOST_DEPTH = 32  # of elements in each other
+MOST_DEPTH = 32  # of nested elements
 DECIMALS = 9  # of sums of points
 ROOT = "mvnx"
 LISTS = (  # elements whose children have labels
@@ -85,8 +85,8 @@ _DECIMAL = re.compile(r"[-+]?[0-9]{1,9}\.?[0-9]{0,15}")
 class MvnxHeader:
     """The names in a header; ``frames`` is the offset of that element.
 
-    ``labels``: of each of ``LISTS``, in order. ``points``: of each segment, by name, in meters
-    along its axes. ``connectors``: the points of two segments that each joint of a body connects.
+    ``labels``: those of each of ``LISTS``, in order. ``points``: those of each segment by name, in
+    meters along its axes. ``connectors``: for each joint the two points that it connects.
     """
 
     frames: int = 0
@@ -98,7 +98,7 @@ class MvnxHeader:
     connectors: list[tuple[Place, Place]] = field(default_factory=list)
 
     def tails(self) -> dict[str, list[Vector]]:
-        """The points of each segment to which other segments are attached."""
+        """The points of each segment where other segments are attached."""
         tails: dict[str, list[Vector]] = {}
         for place in dict.fromkeys(near for near, _ in self.connectors):
             if place in self.points:
@@ -133,26 +133,26 @@ def is_mvnx(head: bytes) -> bool:
 
 
 def read_header(data: bytes) -> MvnxHeader:
-    """The header of an MVNX file; SourceError, with the number of the line, if it has none.
+    """Read the header of an MVNX file; raises SourceError, with its line, if there is none.
 
-    It is read as UTF-8, or else as Latin-1, whatever it declares.
+    It is read as UTF-8, or else as Latin-1, regardless of its declaration.
     """
     start = data[:MOST_BYTES]
     try:
-        return _Reader(start).read("utf-8")
+        return _HeaderParser(start).read("utf-8")
     except expat.ExpatError as error:
         if error.code != _INVALID:
-            raise _refused(error) from None
+            raise _xml_error(error) from None
     try:
-        return _Reader(start).read("iso-8859-1")
+        return _HeaderParser(start).read("iso-8859-1")
     except expat.ExpatError as error:
-        raise _refused(error) from None
+        raise _xml_error(error) from None
 
 
 _INVALID = expat.errors.codes[expat.errors.XML_ERROR_INVALID_TOKEN]
 
 
-def _refused(error: expat.ExpatError) -> SourceError:
+def _xml_error(error: expat.ExpatError) -> SourceError:
     return SourceError(f"not XML: {expat.ErrorString(error.code)}", line=error.lineno)
 
 
@@ -160,7 +160,7 @@ class _FramesReached(Exception):
     """The element ``frames`` begins."""
 
 
-class _Reader:
+class _HeaderParser:
     """The events of expat -> a Header."""
 
     def __init__(self, data: bytes) -> None:

@@ -1,7 +1,7 @@
-"""The frames of an MVNX file: places of their numbers, their columns, and channels of these.
+"""Frames of an MVNX file: offsets of numbers, their columns, and the channels of columns.
 
-A frame is a tag with attributes, elements of text, and nothing else: no comment, no element in
-another, no CDATA. The tags and blanks between the numbers are gaps of a row.
+A frame is a tag with attributes and elements of text, without comments, nested elements and CDATA.
+Tags and blanks between the numbers are gaps of a row.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from mcz.sources.text.rows import DENSE, Token, TokenRows, line_of, read_rows
 
 POSITION, ORIENTATION = "position", "orientation"
 INDEX, TIME, TYPE = "@index", "@time", "@type"  # @: an attribute of frames
-NORMAL = (b"normal", b"")  # types of frames of motion
+NORMAL = (b"normal", b"")  # types of motion frames
 END = b"</frame>"
-MOST_PARTS = 64  # elements and attributes of a frame
+MOST_PARTS = 64  # most elements and attributes of a frame
 XYZ, WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
-OWNERS = (  # of an element: the list in the header that names its parts, and a part's numbers
+OWNERS = (  # pattern of elements, list of the header with the names of their parts, axes of a part
     (r"velocity|acceleration|angular(?:Velocity|Acceleration)", "segments", XYZ),
     (r"sensor(?:(?:Free)?Acceleration|AngularVelocity|MagneticField)", "sensors", XYZ),
     (r"sensorOrientation", "sensors", WXYZ),
@@ -46,7 +46,7 @@ UNITS = (
     (r"centerOfMass|position.*", "m"),
     (r"ms", "ms"),
 )
-MASS = (  # centerOfMass, of which older files have the first three
+MASS = (  # of centerOfMass; older files have the first three
     *(Channel("", axis, "m") for axis in XYZ),
     *(Channel("", f"velocity.{axis}", "m/s") for axis in XYZ),
     *(Channel("", f"acceleration.{axis}", "m/s^2") for axis in XYZ),
@@ -75,7 +75,7 @@ class _WiderError(Exception):
 class FrameColumns:
     """The columns of each part of a frame: of the motion, other elements, attributes, the time.
 
-    ``kinds``: of the channels of each of ``n_segments`` segments.
+    ``kinds``: channel kinds of a segment; all of ``n_segments`` have the same.
     """
 
     columns: Mapping[str, Sequence[int]]
@@ -95,13 +95,13 @@ class FrameColumns:
 
     @property
     def attributes(self) -> list[str]:
-        """The attributes but for the time and the number of the frame."""
+        """The attributes except the time and the frame number."""
         names = [name for name in self.columns if name[0] == "@" and name != TIME]
         return [name for name in names if self.column(name) != FRAME_NUMBER]
 
     @property
     def first_attribute(self) -> int:
-        """The column of the first of these."""
+        """The column of the first attribute."""
         return self.n_motion + sum(len(self.columns[name]) for name in self.elements)
 
     def column(self, name: str) -> int:
@@ -136,11 +136,11 @@ def first_frame(data: bytes, at: int) -> int:
             raise SourceError(
                 "the file is truncated in a calibration frame", line=line_of(data, at)
             )
-        at = _BLANKS.match(data, end + len(END)).end()  # type: ignore[union-attr]  # nothing, too
+        at = _BLANKS.match(data, end + len(END)).end()  # type: ignore[union-attr]  # matches always
 
 
 def read_frames(data: bytes, at: int) -> tuple[TokenRows, FrameColumns]:
-    """Read the frames from offset ``at`` to the end of ``data``; SourceError for anything else."""
+    """Read all frames from offset ``at`` on; raises SourceError for other content."""
     first, _ = _parts(data, at)
     sizes = {name: len(tokens) for name, tokens in first if tokens}
     numbered = any(
@@ -160,7 +160,7 @@ def _read(data: bytes, at: int, columns: FrameColumns) -> tuple[TokenRows, Frame
 
 
 def _frames(data: bytes, columns: FrameColumns) -> Callable[[int], tuple[list[Token], int] | None]:
-    """The tokens of the frame at an offset; see ``rows.Frames``."""
+    """Return a function that reads a frame's tokens; see ``rows.Frames``."""
 
     def read_frame(at: int) -> tuple[list[Token], int] | None:
         if at >= len(data):
@@ -180,9 +180,9 @@ def _frames(data: bytes, columns: FrameColumns) -> Callable[[int], tuple[list[To
 
 
 def _parts(data: bytes, at: int) -> tuple[list[Part], int]:
-    """The parts of the frame at an offset that are not blank, and where it ends.
+    """The parts that are not blank of the frame at an offset, and its end.
 
-    An element of words has no tokens.
+    An element of words has an empty list of tokens.
     """
     opened = _FRAME.match(data, at)
     if opened is None:
@@ -231,7 +231,7 @@ def _attributes(data: bytes, start: int, stop: int) -> dict[str, tuple[int, int]
 
 
 def _all_sizes(data: bytes, at: int) -> dict[str, int]:
-    """The most numbers of each part of any frame from offset ``at`` on."""
+    """Greatest count of numbers of each part, over all frames from offset ``at`` on."""
     sizes: dict[str, int] = {}
     for name, text in _all_parts(data, at):
         sizes[name] = max(sizes.get(name, 0), len(text.split()) if name[0] != "@" else 1)
@@ -288,7 +288,7 @@ def channels_of(
 ) -> tuple[Channel, ...]:
     """Channels of an element with ``size`` numbers, named after its parts if their sizes fit.
 
-    ``labels_of`` gives the names of parts by the list of the header that has them.
+    ``labels_of``: names of parts by the list in the header.
     """
     if element == "centerOfMass" and size <= len(MASS):
         return MASS[:size]

@@ -153,7 +153,7 @@ def _trc_times(
 def _mark_header(
     data: bytes, header: _TrcHeader, n_rows: int, names: Sequence[str]
 ) -> tuple[bytes, bytes]:
-    """The header with marks for names, their numbers and the number of rows; and as it is."""
+    """The header with marks for names, their numbers and the count of rows; and unmarked."""
     start, stop = header.labels
     parts = (
         named_count(data, 0, start, header.count, n_rows),

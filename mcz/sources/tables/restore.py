@@ -133,7 +133,7 @@ def _with_columns(
 UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m"}
 DECIMALS = 6  # of times that are whole microseconds
 MORE_DECIMALS = 9
-MISSING = b"NaN"  # as OpenSim writes it, to which blank cells at the end of a row are none
+MISSING = b"NaN"  # as OpenSim writes it; it does not count blank cells at the end of a row
 SECONDS = Channel("", "time", "s")
 
 
@@ -203,7 +203,7 @@ def _with_source(
 
 
 def _times(motion: Motion) -> tuple[Clock | None, tuple[Signal, ...]]:
-    """The clock that prints the times of ``motion``, or a signal of them."""
+    """The clock that prints the times of ``motion``, or else a signal of times."""
     timeline = motion.timeline
     if timeline is None:
         raise MotionError(

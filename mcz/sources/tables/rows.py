@@ -1,7 +1,7 @@
-"""The rows of a table in text: cells between separators, of one number or of several.
+"""Rows of a table in text: cells between separators, with one or several numbers.
 
-``read_table`` finds the token of every column of every row, what stands for a missing value, and
-the patterns that lay them out.
+``read_table`` finds the token of every column of every row, the text of a missing value, and the
+patterns of the layout.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ def begins_with_number(line: bytes) -> bool:
 class RowCells:
     """The tokens of the row that begins at an offset; see ``rows.Frames``.
 
-    ``columns``: of each cell its columns, several if it holds several numbers. ``separator``
-    None: blanks. ``blanks``: cells may be empty. ``free``: the first one, too.
+    ``columns``: the columns of each cell, several if it holds several numbers. ``separator`` None:
+    blanks. ``blanks``: cells may be empty. ``free``: the first one, too.
     """
 
     def __init__(
@@ -132,9 +132,9 @@ class RowCells:
 
 @dataclass(frozen=True, slots=True)
 class TableRows:
-    """All rows, and what stands for a missing value; a missing one has start and stop 0.
+    """All rows, and the text of a missing value, which has start and stop 0.
 
-    ``texts``: the columns that are text, which ``rows`` have the numbers of.
+    ``texts``: the columns of text, whose numbers ``rows`` has.
     """
 
     rows: TokenRows
@@ -286,7 +286,7 @@ class _Item:
 
 
 def _move_pattern(pattern: Pattern, zeros: dict[int, bytes]) -> Pattern:
-    """``pattern`` with the zeros behind each token at the front of the gap that follows."""
+    """``pattern`` with the zeros after each token moved to the front of the next gap."""
     items, before = [], b""
     for item in _split(pattern):
         zero = zeros.get(item.column, b"")

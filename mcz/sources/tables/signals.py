@@ -1,7 +1,6 @@
 """Signals from tokens of rows: values, number grids, exceptions and masks.
 
-The columns of a table are different things: a time, an angle, a force. So are their digits: each
-column may have a grid of its own.
+Columns differ: a time, an angle, a force. So do their digits: each may have its own grid.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from mcz.sources.text.rows import TokenRows, line_of
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
-CANDIDATES = 8  # grids of single columns that are tried on all of them
+CANDIDATES = 8  # most grids of single columns that are tried on all columns
 BLOCK = 512  # rows that may have a grid of their own
 WORTH = 32  # exceptions that a change of grid must save
 RARE = 1 / 200  # exceptions of a column, by its tokens, that are cheaper than a digit more for each
@@ -103,7 +102,7 @@ def _grids(
 
 
 def _doubtful(tokens: Tokens, mask: Bools, common: Grid, printed: Bools) -> list[int]:
-    """The columns with exceptions to which another grid than ``common`` may fit better."""
+    """The columns that may fit another grid than ``common`` better, as they have exceptions."""
     missed = np.flatnonzero(~printed)
     cells = missed if mask.all() else np.flatnonzero(mask)[missed]
     n_columns = mask.shape[1]
@@ -173,7 +172,7 @@ EXCEPTION_BITS = 200
 TEXT = "text"  # the signal of the numbers in text columns
 MAX_NOTE = 200
 _TEXT_NOTE = re.compile(r"(?:^|; )[0-9]+ columns? (?:is|are) text: ([^;]*)")
-MOST_TRIED = 2048  # columns; of more each may take long, and has little to gain
+MOST_TRIED = 2048  # most columns that are tried; among more, each gains little
 
 
 def select_columns(rows: TokenRows, columns: Sequence[int]) -> TokenRows:
@@ -251,7 +250,7 @@ def text_note(labels: Sequence[str]) -> str:
 
 
 def text_columns(metadata: Mapping[str, str]) -> str:
-    """The names of the columns of text of a table that was read; "" if it has none."""
+    """Names of the columns of text of a table; "" if it has none."""
     match = _TEXT_NOTE.search(metadata.get("source-note", ""))
     return match[1] if match else ""
 

@@ -60,7 +60,7 @@ class OddCells:
         return counts.most_common(1)[0] if counts else (b"", 0)
 
     def text_columns(self) -> list[int]:
-        """The columns in which more than half of the cells are texts."""
+        """The columns whose cells are mostly texts."""
         n_columns = len(self.n_cells)
         is_comma = np.array(
             [DECIMAL_COMMA.fullmatch(text) is not None for text in self.texts], np.bool_

@@ -141,7 +141,7 @@ class _Digits:
     noise: float
 
     def fit(self, times: Floats, count: Floats | Ints, rate: Fraction, share: float = 0) -> bool:
-        """Return whether times are ``count`` frames from one start, each rounded to a digit.
+        """Return True if times are ``count`` frames from one start, each rounded to a digit.
 
         Digits of more than a quarter of a frame fit almost any rate: only a ``share`` of them may
         be missed.

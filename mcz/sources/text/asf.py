@@ -32,7 +32,7 @@ def read(data: bytes, name: str = "skeleton") -> Skeleton:
 
 
 def _read(data: bytes, name: str) -> Skeleton:
-    """``read`` as every decoder does it, who takes the text as it is."""
+    """Read an ASF without the checks of its text, as every decoder does."""
     skeleton = read_text(data.decode(text_encoding(data)), name)
     digest = hashlib.sha256(data).digest()
     return replace(skeleton, source=Source("asf", data, size=len(data), sha256=digest))
@@ -41,7 +41,7 @@ def _read(data: bytes, name: str) -> Skeleton:
 def write(skeleton: Skeleton) -> bytes:
     """The ASF file of ``skeleton``: its own source if that still describes it, or a plain one.
 
-    Raises MotionError for what ASF cannot say. The length unit is kept only if it is CMU's.
+    Raises MotionError if ASF cannot hold it. Only CMU's length unit is kept.
     """
     source = skeleton.source
     if source is not None and source.format == "asf":
@@ -51,10 +51,10 @@ def write(skeleton: Skeleton) -> bytes:
             raise FormatError(f"source template: {error}") from None
         if replace(original, unit_cm=skeleton.unit_cm, base=skeleton.base) == skeleton:
             return source.template
-    return _plain(skeleton).encode()
+    return _plain_text(skeleton).encode()
 
 
-def _plain(skeleton: Skeleton) -> str:
+def _plain_text(skeleton: Skeleton) -> str:
     root, *bones = _check_joints(skeleton)
     length = INCH_UNITS if skeleton.unit_cm == INCH_UNIT_CM else 1.0
     lines = [
@@ -80,7 +80,7 @@ def _plain(skeleton: Skeleton) -> str:
             f"    name {joint.name}",
             f"    direction {_text(direction)}",
             f"    length {size!r}",
-            f"    axis {_whole(joint.axis)}  {joint.axis_order}",
+            f"    axis {_short_text(joint.axis)}  {joint.axis_order}",
         ]
         if joint.channels:
             lines.append(f"    dof {' '.join(_dof(c) for c in joint.channels)}")
@@ -101,13 +101,13 @@ def _text(vector: Vector) -> str:
     return " ".join(f"{x!r}" for x in vector)
 
 
-def _whole(vector: Vector) -> str:
-    """The same with whole numbers as such, as angles of axes are usually written."""
+def _short_text(vector: Vector) -> str:
+    """A vector with whole numbers as integers, the usual form of axis angles."""
     return " ".join(repr(x).removesuffix(".0") for x in vector)
 
 
 def _polar(vector: Vector) -> tuple[Vector, float]:
-    """A direction and a length whose product is ``vector`` exactly."""
+    """A direction and a length with the exact product ``vector``."""
     x, y, z = vector
     length = sqrt(x * x + y * y + z * z)
     if length:
@@ -160,7 +160,7 @@ class _Bone:
 
 
 @dataclass(slots=True)
-class _Reader:
+class _Parser:
     """Parser state; ``section`` and ``bone`` are the context of the next line."""
 
     section: str = ""
@@ -263,7 +263,7 @@ def read_text(text: str, name: str) -> Skeleton:
     Joint 0 is the root. A bone becomes a joint at its parent's tail, with its own vector, in the
     file's length unit, as its tail. Raises SourceError, with the number of the line if it can.
     """
-    reader = _Reader()
+    reader = _Parser()
     for number, line in enumerate(_LINE_END.split(text), 1):
         try:
             reader.line(line)
@@ -287,8 +287,8 @@ def _is_inch_unit(length: str) -> bool:
         return False
 
 
-def _joints(reader: _Reader) -> tuple[Joint, ...]:
-    """The root, then the bones in definition order, moved back only if a parent comes later."""
+def _joints(reader: _Parser) -> tuple[Joint, ...]:
+    """The root, then the bones in definition order, but none before its parent."""
     for parent, child in reader.links:
         bone = reader.bones.get(child)
         if bone is None or (parent != "root" and parent not in reader.bones):
@@ -316,7 +316,7 @@ def _joints(reader: _Reader) -> tuple[Joint, ...]:
 
 
 def _parents_first(bones: list[_Bone]) -> list[_Bone]:
-    """The bones, a bone whose parent is defined later directly after it; SourceError on a cycle."""
+    """The bones; one whose parent comes later moves right after it. SourceError on a cycle."""
     waiting: dict[str, list[_Bone]] = {}
     placed = {"root", None}
     result: list[_Bone] = []

@@ -79,7 +79,7 @@ def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving
     if not n_columns:
         raise SourceError("no joint has channels")
     count, time, body = _motion_section(data, at, n_columns)
-    frames = _arriving(chain([data[body:]], source), source, n_columns)
+    frames = _read_arriving(chain([data[body:]], source), source, n_columns)
     first = list(islice(frames, 1))
     values = np.array([row for _, row in first]).reshape(-1, n_columns)
     rate, exact = frame_rate(data[slice(*time)].decode("latin-1"))
@@ -90,7 +90,7 @@ def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving
     return Arriving(bones, chain(first, frames), rate, exact, notes, declared=number)
 
 
-def _arriving(lines: Iterable[bytes], source: Lines, n_columns: int) -> Iterator[Frame]:
+def _read_arriving(lines: Iterable[bytes], source: Lines, n_columns: int) -> Iterator[Frame]:
     """The frames that the numbers of ``lines`` make."""
     words: list[bytes] = []
     for line in lines:

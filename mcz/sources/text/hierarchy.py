@@ -23,7 +23,7 @@ from mcz.sources.text.source import MOST_CHANNELS, MOST_DEPTH, MOST_JOINTS, chec
 _KINDS = {"position": "t", "rotation": "r", "scale": "s"}
 _NAMES = {f"{k}{a}": f"{a.upper()}{name}" for name, k in _KINDS.items() for a in "xyz"}
 _WORD = re.compile(rb"(?:[\x00-\x20]++|#[^\n]*+)*+([{}]|[^\x00-\x20{}]+)")
-# The usual text behind a keyword, in one match; what does not match is read word by word.
+# The usual text after a keyword, in one match; other text is read word by word.
 _NUMBERS = re.compile(rb"[\t ]+([^\x00-\x20{}#][^\x00-\x20{}]*)" * 3 + rb"(?=[\x00-\x20{}])")
 _KNOWN_CHANNELS = re.compile(
     rb"[\t ]+([0-9]{1,9})((?:[\t ]+[XYZxyz](?:position|rotation))+)(?=[\t\r\n ])"
@@ -49,7 +49,7 @@ class _Node:
 
 
 @dataclass(slots=True)
-class _Reader:
+class _Parser:
     data: bytes
     at: int = 0
     joints: list[_Node] = field(default_factory=list)
@@ -178,7 +178,7 @@ def read_hierarchy(data: bytes, encoding: str) -> tuple[list[Joint], int, int]:
     Stray words are alone on their line, remains of another file that was written over. Position
     channels are taken to add to the offset: only the values can tell.
     """
-    reader = _Reader(data, text_start(data))
+    reader = _Parser(data, text_start(data))
     _refuse_early(reader)
     reader.read()
     joints = [
@@ -194,7 +194,7 @@ def read_hierarchy(data: bytes, encoding: str) -> tuple[list[Joint], int, int]:
     return joints, reader.at, reader.strays
 
 
-def _refuse_early(reader: _Reader) -> None:
+def _refuse_early(reader: _Parser) -> None:
     """Raise SourceError for far too many joints before the first one is looked at more closely.
 
     That takes moments; only joints that begin a line are counted.
@@ -237,13 +237,13 @@ def write_hierarchy(skeleton: Skeleton) -> tuple[str, list[int]]:
             lines.append("\t" * min(depth, MAX_INDENT) + "}")
             continue
         order.append(index)
-        lines += _opening(skeleton.joints[index], depth)
+        lines += _opening_lines(skeleton.joints[index], depth)
         stack.append((-1, depth))
         stack += [(child, depth + 1) for child in reversed(children.get(index, []))]
     return "\n".join([*lines, ""]), order
 
 
-def _opening(joint: Joint, depth: int) -> list[str]:
+def _opening_lines(joint: Joint, depth: int) -> list[str]:
     """The lines of a joint up to its first child; its end sites come before."""
     indent = "\t" * min(depth, MAX_INDENT)
     names = [_NAMES.get(c.kind, c.name) for c in joint.channels]

@@ -47,7 +47,7 @@ BIT = bounded(UVARINT, 0, 1)  # SRC-13
 
 
 class RunFields(Record):
-    """Tokens of a frame behind equal gaps, in PATTERN."""
+    """Tokens of a frame after equal gaps, in PATTERN."""
 
     gap: int = field(UVARINT, "number of the gap that precedes every token of the run")
     column: int = field(UVARINT, "first column: 0 the frame number, c + 1 channel c")
@@ -156,7 +156,7 @@ class FrameLayout:
 
     def build(self) -> tuple[bytes, bytes]:
         """The bytes of the template and of the detail; LimitError for too many runs."""
-        shared, own = numbered_patterns(self.patterns)
+        shared, own = number_patterns(self.patterns)
         template = Template(header=list(self.header), gaps=shared.gaps, patterns=shared.patterns)
         return build(template, "source template"), build(self.detail(own), "source detail")
 
@@ -179,7 +179,7 @@ class PatternTable(NamedTuple):
     patterns: list[PatternFields]
 
 
-def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[PatternTable, PatternTable]:
+def number_patterns(patterns: Sequence[Pattern]) -> tuple[PatternTable, PatternTable]:
     """Gaps and patterns of a template and of a detail; LimitError for too many runs."""
     if sum(len(pattern.runs) for pattern in patterns) > MAX_RUNS:
         raise LimitError(f"the frames have more than {MAX_RUNS} runs of columns")
@@ -215,10 +215,10 @@ def parse_layout(template: bytes, detail: bytes, n_channels: int) -> FrameLayout
     own = parse(Detail, detail, "source detail", {"runs": MAX_RUNS})
     if len(shared.header) not in (1, 2):  # SRC-03
         raise FormatError(f"source template: {len(shared.header)} parts of a header (1 or 2)")
-    return parsed_patterns(tuple(shared.header), shared, own, n_channels)
+    return parse_patterns(tuple(shared.header), shared, own, n_channels)
 
 
-def parsed_patterns(
+def parse_patterns(
     header: tuple[bytes, ...], shared: Any, own: Any, n_channels: int
 ) -> FrameLayout:
     """The layout of the fields of a template and of a detail; raises FormatError."""
@@ -347,14 +347,14 @@ def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
             continue
         where = f"source notes of rows {start} to {stop}"
         fields = parse(Notes, data, where)
-        for first, last, pattern in checked_runs(fields.patterns, stop - start, where):
+        for first, last, pattern in parse_runs(fields.patterns, stop - start, where):
             patterns[start + first : start + last] = pattern
-        odd_texts = checked_texts(fields.texts, stop - start, where)
+        odd_texts = parse_texts(fields.texts, stop - start, where)
         texts += [(start + row, text) for row, text in odd_texts]
     return RowNotes(patterns, tuple(texts))
 
 
-def checked_runs(runs: Sequence[PatternRun], n_rows: int, where: str) -> list[tuple[int, int, int]]:
+def parse_runs(runs: Sequence[PatternRun], n_rows: int, where: str) -> list[tuple[int, int, int]]:
     """(start, stop, pattern) of PATTERN_RUNs of ``n_rows`` rows; raises FormatError."""
     checked, row = [], 0
     for run in runs:
@@ -368,7 +368,7 @@ def checked_runs(runs: Sequence[PatternRun], n_rows: int, where: str) -> list[tu
     return checked
 
 
-def checked_texts(texts: Sequence[NumberText], n_rows: int, where: str) -> list[tuple[int, bytes]]:
+def parse_texts(texts: Sequence[NumberText], n_rows: int, where: str) -> list[tuple[int, bytes]]:
     """(row, text) of NUMBER_TEXTs of ``n_rows`` rows; raises FormatError."""
     rows = _rows([entry.row for entry in texts], n_rows, where)
     wrong = [entry.text for entry in texts if not FRAME_NUMBER_TEXT.fullmatch(entry.text)]

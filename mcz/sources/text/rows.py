@@ -111,10 +111,10 @@ def read_rows(
     widths = widths or {}
     for look_at in LOOK_FOR_PADDING:
         try:
-            return _Reader(data, n_columns, frames, cells, widths, room, look_at).read(at)
+            return _RowScanner(data, n_columns, frames, cells, widths, room, look_at).read(at)
         except _Padded as padded:
             widths = padded.widths
-    return _Reader(data, n_columns, frames, cells, widths, room).read(at)
+    return _RowScanner(data, n_columns, frames, cells, widths, room).read(at)
 
 
 class _Padded(Exception):
@@ -125,7 +125,7 @@ class _Padded(Exception):
 
 
 @dataclass(slots=True)
-class _Reader:
+class _RowScanner:
     data: bytes
     n_columns: int
     frames: Frames

@@ -25,18 +25,18 @@ from mcz.sources.tables.layout import (
     NAME,
     Clock,
     Section,
-    any_mark,
     build_table,
     fill_marks,
-    with_phrases,
+    has_mark,
+    mark_phrases,
 )
 from mcz.sources.text.layout import (
     FrameLayout,
     NumberText,
     PatternRun,
     RowNotes,
-    checked_runs,
-    checked_texts,
+    parse_runs,
+    parse_texts,
 )
 from mcz.sources.text.rows import TokenRows
 
@@ -215,8 +215,8 @@ def section_of(
     ``header``: with marks, and as it is; the second is taken if the first does not give it.
     ``beside``: what stands for a missing value, and the clock.
     """
-    marked, whole = with_phrases(header[0]), header[1]
-    fits = not any_mark(whole) and _fills(marked, names, b"%d" % rows.n_rows, whole)
+    marked, whole = mark_phrases(header[0]), header[1]
+    fits = not has_mark(whole) and _fills(marked, names, b"%d" % rows.n_rows, whole)
     return Section(
         tuple(signals),
         marked if fits else whole,
@@ -366,7 +366,7 @@ def join_table_notes(parts: Sequence[tuple[int, int, bytes]]) -> TableNotes:
                     f"{fields.rows_per_frame} rows a frame, once {mine.n_each}", where=where
                 )
             first, n_rows = start * mine.n_each, (stop - start) * mine.n_each
-            runs = checked_runs(fields.patterns, n_rows, where)
+            runs = parse_runs(fields.patterns, n_rows, where)
             mine.runs += [(first + a, first + b, p) for a, b, p in runs if p]
-            mine.texts += [(first + r, t) for r, t in checked_texts(fields.texts, n_rows, where)]
+            mine.texts += [(first + r, t) for r, t in parse_texts(fields.texts, n_rows, where)]
     return TableNotes(tuple(joined))

@@ -1,4 +1,4 @@
-"""The compiled loops of ``rows`` and ``restore``; imported on first use.
+"""Compiled loops of ``rows`` and ``restore``; imported on first use.
 
 Blanks are the bytes up to 0x20.
 """
@@ -30,7 +30,7 @@ def _token_end(text: Bytes, at: int, cells: int) -> int:
         while at + 8 <= len(text):
             word = eight_bytes(text, at)
             others = word ^ -1
-            blanks = word - 0x0021212121212121 & others & 0x0080808080808080  # seven at once
+            blanks = word - 0x0021212121212121 & others & 0x0080808080808080  # seven bytes at once
             if blanks:
                 return at + (trailing_zeros(blanks) >> 3)
             at += 7
@@ -58,7 +58,7 @@ def _blanks(text: Bytes, at: int) -> int:
 
 
 def _number(text: Bytes, start: int, stop: int) -> int:
-    """The plain decimal integer text[start:stop]; -1 if it is anything else."""
+    """The plain decimal integer text[start:stop]; -1 for other text."""
     if stop == start or stop - start > 15 or (text[start] == ZERO and stop > start + 1):
         return -1
     value = 0
@@ -151,11 +151,11 @@ def match_rows(
 ) -> tuple[int, int]:
     """Match as many rows of one pattern as possible from offset ``at`` and row ``row`` on.
 
-    ``cells``: what a token is. One of ``WORDS`` ends at a blank. Those of tables end at separators
-    and quotes, too: none is empty if ``FULL``, all but the first may be if ``BLANKS``, and
-    all if ``FREE``. One of ``MARKUP`` ends at a blank, quote or tag, and is not empty. Fills
-    ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,). Returns the row and the
-    offset of the first row that does not match, or for which there is no room.
+    ``cells`` defines tokens. ``WORDS``: a token ends at a blank. ``MARKUP``: also at a quote or
+    tag. Both are never empty. Tables: a token ends at a blank, separator or quote; ``FULL``: none
+    is empty, ``BLANKS``: all but the first may be, ``FREE``: all may be. Fills ``start`` and
+    ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,). Returns the row and the offset of the
+    first row that does not match, or for which there is no room.
     """
     columns = items.columns
     numbered = cells == WORDS and len(columns) > 0 and columns[0] == -1

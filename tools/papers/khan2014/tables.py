@@ -169,7 +169,7 @@ def _order(cases: Mapping[str, Case], results: Results) -> Iterator[ResultTable]
         for published in (False, True):
             found = {}
             for variant in _variants():
-                if variant.published == published:
+                if variant.is_published == published:
                     ratio = _ratio(clip, results[_at_common(case, clip, variant)])
                     if ratio is not None:
                         found[variant.codec] = ratio

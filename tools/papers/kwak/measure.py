@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mcz
-from mcz.bench.cases import Loaded, Variant, load
+from mcz.bench.cases import LoadedCase, Variant, load
 from mcz.bench.measure import Record, codec_calls, cpu_seconds, dial_of, write_file
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_finder
@@ -202,7 +202,7 @@ def file_points(
         points = [_file_point(motion, given | {"bitrate": rate}, with_filter) for rate in wanted]
         return sorted(points, key=lambda p: -p["coded_bytes"])
     dial, settings = dial_of(variant)
-    loaded = Loaded(motion, b"", load(clip.case).digest)
+    loaded = LoadedCase(motion, b"", load(clip.case).digest)
 
     def measure(setting: float) -> Record:
         return point_of(loaded, variant, {dial.parameter: settings.to_parameter(setting)})

@@ -22,7 +22,7 @@ FULL, WIDE, ROOM = 0xFFFFFFFF, 0xFFFFFFFFFFFFFFFF, 128
 
 
 def npy(
-    array: NDArray[Any], code: str = "", *, by_columns: bool = False, room: int = ROOM
+    array: NDArray[Any], code: str = "", *, is_fortran: bool = False, room: int = ROOM
 ) -> bytes:
     """An NPY file of version 1; ``code`` is that of its type, "<f8" and the like.
 
@@ -31,11 +31,11 @@ def npy(
     code = code or array.dtype.str.replace("=", "<")
     shape = "({},)" if array.ndim == 1 else "({})"
     text = (
-        f"{{'descr': '{code}', 'fortran_order': {by_columns}, "
+        f"{{'descr': '{code}', 'fortran_order': {is_fortran}, "
         f"'shape': {shape.format(', '.join(map(str, array.shape)))}, }}"
     )
     text += " " * (-(len(text) + 11) % room) + "\n"
-    numbers = array.astype(code).tobytes(order="F" if by_columns else "C")
+    numbers = array.astype(code).tobytes(order="F" if is_fortran else "C")
     return b"\x93NUMPY\1\0" + struct.pack("<H", len(text)) + text.encode() + numbers
 
 

@@ -59,17 +59,17 @@ def shape(array: NDArray[Any]) -> bytes:
     return tuple_of(*map(integer, array.shape))
 
 
-def content(array: NDArray[Any], *, by_columns: bool = False) -> bytes:
-    return array.tobytes(order="F" if by_columns else "C")
+def content(array: NDArray[Any], *, is_fortran: bool = False) -> bytes:
+    return array.tobytes(order="F" if is_fortran else "C")
 
 
-def plain_array(array: NDArray[Any], *, by_columns: bool = False) -> bytes:
+def plain_array(array: NDArray[Any], *, is_fortran: bool = False) -> bytes:
     """An array as NumPy pickles it."""
     made = name("numpy._core.multiarray", "_reconstruct") + tuple_of(
         name("numpy", "ndarray"), tuple_of(integer(0)), sized(b"b")
     )
-    flag = b"\x88" if by_columns else b"\x89"
-    data = sized(content(array, by_columns=by_columns))
+    flag = b"\x88" if is_fortran else b"\x89"
+    data = sized(content(array, is_fortran=is_fortran))
     return made + b"R" + tuple_of(integer(1), shape(array), dtype(array), flag, data) + b"b"
 
 

@@ -39,7 +39,7 @@ def scale_of(quarters: int) -> int:
 
 
 def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
-    """A varint and the offset behind it; -1 if there is none."""
+    """A varint and the offset after it; -1 if there is none."""
     value = shift = 0
     while at < end and shift < 56:
         byte = int(data[at])
@@ -66,7 +66,7 @@ def skip_ordinal(data: Bytes, at: int, end: int, size: int) -> int:
 
 
 def skip_runs(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, int]:
-    """The offset behind the runs of steps, or -1; and the fault."""
+    """The offset after the runs of steps, or -1; and the fault."""
     n_runs, at = varint(data, at, end)
     left = n_rows
     while n_runs > 0 and at >= 0:
@@ -84,7 +84,7 @@ def skip_runs(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, int]:
 
 
 def skip_exceptions(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, int]:
-    """The offset behind exceptions, or -1; and the fault."""
+    """The offset after exceptions, or -1; and the fault."""
     n_exceptions, at = varint(data, at, end)
     row = -1
     while n_exceptions > 0 and at >= 0:
@@ -128,7 +128,7 @@ def set_scale(plan: Ints, column: int, byte: int) -> bool:
 
 
 def read_form(data: Bytes, at: int, end: int, kind: int, form: int, plan: Ints) -> tuple[int, int]:
-    """Note the form of a coded channel: the offset behind its fields, or -1; and the fault."""
+    """Note the form of a coded channel: the offset after its fields, or -1; and the fault."""
     drop = 0
     if kind & OWN_FORM:
         if at + 2 > end:
@@ -166,7 +166,7 @@ def read_form(data: Bytes, at: int, end: int, kind: int, form: int, plan: Ints) 
 
 
 def read_predictor(data: Bytes, at: int, end: int, kind: int, plan: Ints) -> tuple[int, int]:
-    """Note first lead, scale and taps: the offset behind them, or -1; and the fault."""
+    """Note first lead, scale and taps: the offset after them, or -1; and the fault."""
     plan[FIRST], at = zigzag(data, at, end)
     if at < 0 or at >= end:
         return -1, ENDS
@@ -193,7 +193,7 @@ def read_predictor(data: Bytes, at: int, end: int, kind: int, plan: Ints) -> tup
 def read_coded(
     data: Bytes, at: int, end: int, kind: int, n_rows: int, form: int, plan: Ints
 ) -> tuple[int, int]:
-    """Note the head of a coded channel: the offset behind it, or -1; and the fault."""
+    """Note the head of a coded channel: the offset after it, or -1; and the fault."""
     at, fault = read_form(data, at, end, kind, form, plan)
     if at >= 0:
         at, fault = read_predictor(data, at, end, kind, plan)
@@ -215,7 +215,7 @@ def read_coded(
 def read_head(
     data: Bytes, at: int, end: int, n_rows: int, form: int, plan: Ints
 ) -> tuple[int, int]:
-    """Note the head of a channel: the offset behind it, or -1; and the fault."""
+    """Note the head of a channel: the offset after it, or -1; and the fault."""
     if at >= end:
         return -1, ENDS
     kind = int(data[at])

@@ -101,7 +101,7 @@ class Heads:
     parts: Ints
 
     def absent(self, kind: int) -> list[int]:
-        """The groups that are not here and that copies or, of coded channels, parents are of."""
+        """Absent groups with sources of copies or parents of coded channels here."""
         named = self.plans[self.plans[:, decode_kernels.KIND] == kind, decode_kernels.GROUP]
         return sorted(set(named[named >= 0].tolist()).difference(self.groups))
 
@@ -162,7 +162,7 @@ class SegmentDecoder:
     def __init__(
         self, shape: Shape, groups: tuple[int, ...], fetch: Fetch, out: Ints, n_rows: int
     ) -> None:
-        """``out``: (rows, channels of ``groups``), of ``n_rows`` the first. Raises FormatError."""
+        """Fill ``out`` (rows, channels of ``groups``) with the first rows; raises FormatError."""
         heads, n_whole = read_heads_of(shape, groups, fetch, n_rows)
         columns = heads.columns
         channel, fault = decode_kernels.link(

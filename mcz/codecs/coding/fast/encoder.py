@@ -1,8 +1,8 @@
 """Write the streams of groups of one segment, and choose the parents of lanes.
 
 SPEC.md, "Codec 1: fast", is normative for the bytes; the choice of a plan is not: any plan decodes.
-A parent has none itself, so that its residuals do not change. Roots are chosen one by one, as a
-greedy facility location does, by compiled functions.
+A parent has no parent, so that its residuals do not change. Compiled functions choose such roots
+one by one, as in greedy facility location.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from mcz.model.numbers import Grid, GridKind
 from mcz.model.types import Bools
 
 PARENT_COST = 36  # bits
-SEEN_ROWS = 96  # that parents are looked for on
+SEEN_ROWS = 96  # sampled rows on which parents are compared
 ROWS_AT_ONCE = 4
-REACH = 160  # lanes before and behind that are looked at
+REACH = 160  # lanes before and after a lane that may be its parent
 LEAST_GAIN = 60.0  # bits, before a parent is tried
 MOST_WEIGHT = 32000
 
@@ -47,7 +47,7 @@ def sample_residuals(residuals: Words2, lane: int, n_seen: int, seen: Floats2) -
 
 
 def share_rows(seen: Floats2, lane: int, n_seen: int, shares: Floats) -> float:
-    """Fill ``shares`` with the weights of rows, where great residuals count less; their cost."""
+    """Fill ``shares`` with weights of rows, less for great residuals; return the energy."""
     size = 0.0
     for row in range(n_seen):
         size += abs(seen[row, lane])
@@ -63,7 +63,7 @@ def share_rows(seen: Floats2, lane: int, n_seen: int, shares: Floats) -> float:
 def add_products(
     seen: Floats2, lane: int, start: int, shares: Floats, both: Floats, squares: Floats
 ) -> None:
-    """Fill in the products of a lane, and the squares, of as many others from ``start`` on."""
+    """Fill ``both`` with a lane's products with lanes from ``start`` on, and ``squares``."""
     stop = start + len(both)
     for other in range(len(both)):
         both[other], squares[other] = 0.0, 1e-9
@@ -83,7 +83,7 @@ def add_products(
 
 
 def weigh(both: float, square: float, total: float) -> tuple[float, float]:
-    """The part of its cost that a parent saves, and its weight in 256ths; or 0."""
+    """The share of the energy that a parent removes, and its weight in 256ths; 0 if too large."""
     weight = np.rint(256.0 * both / square)
     if not abs(weight) < MOST_WEIGHT:
         return 0.0, 0.0
@@ -92,14 +92,14 @@ def weigh(both: float, square: float, total: float) -> tuple[float, float]:
 
 
 def subtract_parent(own: Words, other: Words, weight: int, tried: Words) -> None:
-    """Fill ``tried`` with what a parent's residuals leave of a lane's own."""
+    """Fill ``tried`` with a lane's residuals less the prediction from its parent's."""
     for row in range(1, len(own)):
         crossed = wrapped(128 + weight * int(other[row])) >> 8
         tried[row] = wrapped(int(own[row]) - crossed)
 
 
 def is_open(others: Ints2, child: int, group: int) -> bool:
-    """A group of lanes, ``child``, may have parents in ``group``."""
+    """Return True if lanes of group ``child`` may have parents in ``group``."""
     one, two = others[child, 0], others[child, 1]
     return child == group or one == group or two == group or one < 0 or two < 0
 
@@ -110,7 +110,7 @@ def open_group(others: Ints2, child: int, group: int) -> None:
 
 
 def gain_of(gains: Floats2, bests: Floats, groups: Ints, others: Ints2, root: int) -> float:
-    """The bits that one more root saves, which has no parent then."""
+    """The bits saved if ``root`` becomes a root, and so loses its parent."""
     gain = -max(float(bests[root]), 0.0)
     for lane in range(max(0, root - REACH), min(len(bests), root + REACH + 1)):
         own = gains[lane, root - lane + REACH]
@@ -120,7 +120,7 @@ def gain_of(gains: Floats2, bests: Floats, groups: Ints, others: Ints2, root: in
 
 
 def choose_roots(gains: Floats2, groups: Ints, parents: Ints) -> None:
-    """Note parents, roots that have none themselves; the root that saves most comes first."""
+    """Fill ``parents``, greedily: the root that saves most comes first; -1 for a root."""
     n_lanes = len(groups)
     bests = np.zeros(n_lanes, np.float64)  # what the parent of a lane saves; -1: it is a root
     others = np.zeros((groups[n_lanes - 1] + 1, 2), np.int64)
@@ -168,16 +168,16 @@ def find_gains(residuals: Words2, seen: Floats2, n_seen: int, gains: Floats2) ->
 
 @kernel
 def choose_parents(lanes: CodedLanes, plans: Ints2) -> None:
-    """Note parents and their weights; residuals become what is left.
+    """Choose parents and weights in ``plans``; subtract them from the residuals.
 
-    A group has parents in two others at most.
+    A group has parents in at most two other groups.
     """
     residuals, numbers, costs = lanes.residuals, lanes.numbers, lanes.costs
     n_lanes, n_rows = residuals.shape
     groups, parents = np.zeros(n_lanes, np.int64), np.zeros(n_lanes, np.int64)
     n_seen = min(n_rows - 1, SEEN_ROWS)
     n_blocks = (n_seen + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE
-    seen = np.zeros((ROWS_AT_ONCE * n_blocks, n_lanes), np.float64)  # 0 behind n_seen
+    seen = np.zeros((ROWS_AT_ONCE * n_blocks, n_lanes), np.float64)  # 0 after n_seen
     for group in range(len(lanes.starts) - 1):
         for lane in range(lanes.starts[group], lanes.starts[group + 1]):
             groups[lane], parents[lane] = group, -1
@@ -203,9 +203,9 @@ def choose_parents(lanes: CodedLanes, plans: Ints2) -> None:
 
 
 FEWEST_ROWS = 32  # for a search of parents
-VALUE_BYTES = 20  # of a residual and a tail, of a run or of an exception, at most
-HEAD_BYTES = 128  # besides runs and exceptions, at most, and of the size of residuals
-SPARE = 16  # bytes after the last that are written to
+VALUE_BYTES = 20  # bound for a residual with its tail, a run or an exception
+HEAD_BYTES = 128  # bound for a head without runs and exceptions, and for the size of residuals
+SPARE = 16  # bytes after the end that may be overwritten
 ANY = 2**62  # above all magnitudes
 
 
@@ -225,10 +225,10 @@ class Plan:
 
 
 class StreamBuilder:
-    """Builds the streams of all groups of segments of one signal."""
+    """Builds the streams of a signal, segment by segment."""
 
     def __init__(self, clip_grids: Sequence[Grid], groups: Sequence[Sequence[int]]) -> None:
-        """``clip_grids``: those in CLIP, of each channel of the signal."""
+        """``clip_grids``: the grid of each channel as CLIP states it."""
         sizes = list(map(len, groups))
         self.numbers = np.array([number for group in groups for number in group], np.int64)
         self.firsts = np.cumsum([0, *sizes])

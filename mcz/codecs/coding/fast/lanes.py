@@ -285,7 +285,7 @@ def _read_digits(batch: Sequence[Lanes], lattices: Ints, usual: Bools) -> Ints:
 
 
 def _read_bits(streams: Streams, bits: Ints, long: Ints, longer: Ints) -> Ints:
-    """Numbers of so many bits, one more from ``long`` on, which adds ``longer``; (rows, lanes)."""
+    """Numbers of ``bits``, from ``long`` on with a bit more, plus ``longer``; (rows, lanes)."""
     numbers = np.zeros_like(bits)
     steps = [
         (lanes, bits[:, lanes], MASKS[bits[:, lanes]], long[:, lanes].astype(np.uint64))

@@ -1,4 +1,4 @@
-"""Compiled: the choice of an encoder of ``fast`` of predictor, scale and parent of a lane.
+"""Compiled: encoder choice of predictor, scale and parent for each lane of ``fast``.
 
 Nothing here is normative: any plan decodes.
 """
@@ -26,7 +26,7 @@ MOST_QUARTERS = 120
 
 def code_bits(residual: int, k: int) -> int:
     """Bits of a code."""
-    folded = residual << 1 ^ residual >> 63  # no branch: nobody can guess the sign
+    folded = residual << 1 ^ residual >> 63  # no branch: the sign is unpredictable
     high = folded >> k
     if high <= PLAIN:
         return high + 1 + k

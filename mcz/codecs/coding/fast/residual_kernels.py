@@ -13,8 +13,8 @@ from mcz.kernels import bit_length, eight_bytes, kernel, trailing_zeros, wrapped
 from mcz.kernels.types import Bytes, Ints, Ints2, Words, Words2
 
 BEHIND = 5  # rows that a prediction looks back
-PLAIN = 7  # zeros of a unary part that stand for themselves
-MOST_BITS = 31  # behind a unary part
+PLAIN = 7  # longest unary part that is not an escape
+MOST_BITS = 31  # after a unary part
 MOST_SIZE = 1 << 26  # of a residual, as the scale takes it in
 
 
@@ -41,7 +41,7 @@ def window(data: Bytes, bit: int) -> int:
 
 
 def read_code(data: Bytes, bit: int, scale: int) -> tuple[int, int, int]:
-    """A residual, the bit behind its code, and the scale after it; bit -1: it is none."""
+    """A residual, the bit after its code, and the next scale; bit -1: there is none."""
     k = bit_length(scale >> 4)
     word = window(data, bit)
     zeros = trailing_zeros(word)
@@ -118,7 +118,7 @@ def read_leads(
 ) -> int:
     """Fill ``leads`` (BEHIND + rows, lanes), of which the first rows are those before the first.
 
-    ``bits`` and ``ends``: the first bit of each group's residuals and the one behind the last.
+    ``bits`` and ``ends``: the first bit of each group's residuals and the one after the last.
     ``starts``: the first lane of each group, and the number of all. Returns the row that has no
     code, -2 minus a group that leaves bits, or -1.
     """
@@ -156,7 +156,7 @@ LONGER = tuple(10**n - 2 ** ((10**n).bit_length() - 1) for n in range(10))
 
 
 class Tails(NamedTuple):
-    """The tails of groups: first bit, the one behind the last, first lane; columns of lanes."""
+    """The tails of groups: first bit, the one after the last, first lane; columns of lanes."""
 
     data: Bytes
     bits: Ints
@@ -190,16 +190,16 @@ def decimal_digits(value: int) -> int:
 
 
 def read_decimal_9(data: Bytes, bit: int, n: int) -> tuple[int, int]:
-    """A number below 10^n, n <= 9, and the bit behind it."""
+    """A number below 10^n, n <= 9, and the bit after it."""
     n_bits = FEWEST_BITS[n]
     word = window(data, bit)
     value = word & (1 << n_bits) - 1
-    is_long = 1 if value >= FIRST_LONG[n] else 0  # no branch: nobody can guess it
+    is_long = 1 if value >= FIRST_LONG[n] else 0  # no branch: it is unpredictable
     return value + (is_long & word >> n_bits) * LONGER[n], bit + n_bits + is_long
 
 
 def read_decimal(data: Bytes, bit: int, n: int) -> tuple[int, int]:
-    """A number below 10^n and the bit behind it."""
+    """A number below 10^n and the bit after it."""
     high = 0
     if n > 9:
         high, bit = read_decimal_9(data, bit, n - 9)
@@ -215,7 +215,7 @@ def magnitude_of(lattices: Ints2, lane: int, number: int, mantissa: int) -> int:
 
 
 def read_tiny(data: Bytes, bit: int, lattices: Ints2, lane: int) -> tuple[int, int]:
-    """The magnitude of a lead without digits, and the bit behind its tail; or -1."""
+    """The magnitude of a lead without digits, and the bit after its tail; or -1."""
     below, bit = read_decimal_9(data, bit, 1)
     if below == 0:
         return 0, bit
@@ -234,7 +234,7 @@ def read_tiny(data: Bytes, bit: int, lattices: Ints2, lane: int) -> tuple[int, i
 
 
 def read_magnitude(data: Bytes, bit: int, lead: int, lattices: Ints2, lane: int) -> tuple[int, int]:
-    """The magnitude that begins with the digits of ``lead``, and the bit behind its tail; or -1."""
+    """The magnitude that begins with the digits of ``lead``, and the bit after its tail; or -1."""
     if lead == 0:
         if lattices[lane, TINY]:
             return read_tiny(data, bit, lattices, lane)
@@ -254,7 +254,7 @@ def read_magnitude(data: Bytes, bit: int, lead: int, lattices: Ints2, lane: int)
 
 
 def read_whole(data: Bytes, bit: int, size: int, lattices: Ints2, lane: int) -> tuple[int, int]:
-    """The magnitude of a decimal lead that may have all digits, and the bit behind its tail."""
+    """The magnitude of a decimal lead that may have all digits, and the bit after its tail."""
     n = int(lattices[lane, DIGITS]) - decimal_digits(size)
     if n == 0:
         return int(lattices[lane, SHIFT]) + size, bit
@@ -264,7 +264,7 @@ def read_whole(data: Bytes, bit: int, size: int, lattices: Ints2, lane: int) -> 
 
 
 def read_ordinal(data: Bytes, bit: int, lead: int, lattices: Ints2, lane: int) -> tuple[int, int]:
-    """The ordinal of a lead, or its rest, and the bit behind its tail; bit -1: it has none."""
+    """The ordinal of a lead, or its rest, and the bit after its tail; bit -1: it has none."""
     if lattices[lane, BASE] == 0:
         if lattices[lane, REST] >= 0:
             lead, bit, lattices[lane, REST] = read_code(data, bit, int(lattices[lane, REST]))

@@ -49,7 +49,7 @@ def pack(code: int, n_bits: int) -> int:
 
 def pack_decimal_9(value: int, n: int) -> int:
     n_bits = FEWEST_BITS[n]
-    is_long = 1 if value >= FIRST_LONG[n] else 0  # no branch: nobody can guess it
+    is_long = 1 if value >= FIRST_LONG[n] else 0  # no branch: it is unpredictable
     high = value >> n_bits  # 1 or 0
     return pack(value - high * LONGER[n] | high << n_bits, n_bits + is_long)
 
@@ -119,7 +119,7 @@ def find_leads(lanes: CodedLanes, columns: Ints2) -> None:
 
 
 def put(out: Bytes, bit: int, code: int, n: int) -> int:
-    """Write ``n`` bits, at most 56, the lowest first; returns the bit behind them."""
+    """Write ``n`` bits, at most 56, the lowest first; returns the bit after them."""
     at = bit >> 3
     put_eight_bytes(out, at, code << (bit & 7) | int(out[at]))
     return bit + n
@@ -130,7 +130,7 @@ def put_packed(out: Bytes, bit: int, tail: int) -> int:
 
 
 def put_code(out: Bytes, bit: int, residual: int, scale: int) -> int:
-    """Write a residual; returns the bit behind its code."""
+    """Write a residual; returns the bit after its code."""
     k = bit_length(scale >> 4)
     folded = residual << 1 ^ residual >> 63
     high = folded >> k
@@ -142,7 +142,7 @@ def put_code(out: Bytes, bit: int, residual: int, scale: int) -> int:
 
 
 def put_tiny(out: Bytes, bit: int, ordinal: int, lattice: Ints) -> int:
-    """Write the tail of a lead without digits; returns the bit behind it."""
+    """Write the tail of a lead without digits; returns the bit after it."""
     magnitude = (ordinal ^ ordinal >> 63) >> lattice[DROP]
     if magnitude == 0:
         return put_packed(out, bit, pack_decimal_9(0, 1))
@@ -158,7 +158,7 @@ def put_tiny(out: Bytes, bit: int, ordinal: int, lattice: Ints) -> int:
 
 
 def put_tail(out: Bytes, bit: int, tail: int, lead: int, lattices: Ints2, lane: int) -> int:
-    """Write a tail as a column has it; returns the bit behind it."""
+    """Write a tail as a column has it; returns the bit after it."""
     rest_scale = lattices[lane, REST]
     if rest_scale >= 0:
         lattices[lane, REST] = update_scale(rest_scale, tail)
@@ -191,13 +191,13 @@ def write_parts(
 
 
 def append(out: Bytes, at: int, part: Bytes, size: int) -> int:
-    """Copy the first bytes of ``part``; returns the offset behind them."""
+    """Copy the first bytes of ``part``; returns the offset after them."""
     out[at : at + size] = part[:size]
     return at + size
 
 
 def put_heads(channels: Channels, group: int, fields: Bytes, out: Bytes, at: int) -> int:
-    """Write the heads of a group; returns the offset behind them."""
+    """Write the heads of a group; returns the offset after them."""
     for n in range(channels.firsts[group], channels.firsts[group + 1]):
         at = put_head(channels, n, fields, out, at)
     return at
@@ -232,7 +232,7 @@ def write_streams(
 
 
 def put_varint(out: Bytes, at: int, value: int) -> int:
-    """Write a varint; returns the offset behind it, as all of these do."""
+    """Write a varint; returns the offset after it, as all of these do."""
     while value >= 128:
         out[at] = value & 127 | 128
         value >>= 7

@@ -115,7 +115,7 @@ def find_line(distinct: Floats, grid: Grid) -> Line | None:
     gaps = gaps[gaps > 4 * spacing(distinct[[0, -1]], grid).max()]
     if len(gaps) < FEWEST - 1:
         return None
-    lines = (_grown(distinct, unit) for unit in _guesses(gaps))
+    lines = (_grow_line(distinct, unit) for unit in _guesses(gaps))
     candidates = [line for line in lines if line is not None]
     sharp = [line for line in candidates if np.median(_distances(distinct, line)) < _SHARP]
     return (
@@ -156,7 +156,7 @@ def _distances(values: Floats, line: Line) -> Floats:
     return np.abs(counts - np.rint(counts))
 
 
-def _grown(distinct: Floats, unit: float) -> Line | None:
+def _grow_line(distinct: Floats, unit: float) -> Line | None:
     """A line fitted to ever more of the values around the middle one, or None."""
     middle = float(distinct[len(distinct) // 2])
     line = unit, middle

@@ -120,7 +120,7 @@ FEWEST = 9  # distinct values in a window that shows something
 ENOUGH = 2  # windows that show something
 WIDE = 4.0  # last places of a difference between values, at least
 FEWEST_UNITS = 16.0  # units of a difference that can confirm a unit
-PARTS = 1, 2, 3  # of the least difference, one of which may be the unit
+PARTS = 1, 2, 3  # fractions of the least difference, one of which may be the unit
 LOOSE = 0.25  # of a unit, greatest deviation of a difference
 ROUNDING = 2.0**-23  # of a number: twice its greatest rounding error
 

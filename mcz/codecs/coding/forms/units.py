@@ -33,8 +33,8 @@ from mcz.model.numbers import Grid, GridKind, values_of
 from mcz.model.numbers.rules import POWERS, TENS
 from mcz.model.numbers.value_kernels import decimal, magnitude_of
 
-EXACT = 1 << 53  # up to which quotients of floats are right
-MOST = float(1 << 24)  # units in a value, for which one is looked for
+EXACT = 1 << 53  # quotients of floats are exact up to here
+MOST = float(1 << 24)  # units in a value, beyond which none is searched
 PRINTED = 1 << 62  # no ordinal: the decimal of such a product is to be printed
 
 

@@ -1,8 +1,8 @@
 """A scene as binary glTF 2.0 (ISO/IEC 12113): one file for any viewer.
 
-The node of the motion's name turns the up axis to y; the joints are below it at rest, and one
-animation moves all nodes. Bones are a mesh, skinned to the joints. Markers are nodes with a mesh
-each; glTF has no visibility, so missing ones are scaled to 0, in steps.
+The root node, named after the motion, turns the up axis to y; below it are the joints in the rest
+pose. One animation moves all nodes. Bones are a mesh, skinned to the joints. Markers are nodes with
+a mesh each; glTF has no visibility, so missing ones are scaled to 0, in steps.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ UBYTE, USHORT, UINT, FLOAT = 5121, 5123, 5125, 5126  # component types
 VERTICES, INDICES = 34962, 34963  # purposes of a buffer view
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 HALF = 0.5**0.5
-UP_TURNS = {  # that axis to y, x y z w
+UP_TURNS = {  # quaternions (x, y, z, w) that turn an axis to y
     "x": [0.0, 0.0, HALF, HALF],
     "z": [-HALF, 0.0, 0.0, HALF],
     "-x": [0.0, 0.0, -HALF, HALF],
@@ -51,12 +51,12 @@ UP_MATRICES = {
 
 
 def build_glb(scene: Scene, keys: SceneKeys, generator: str, extras: JsonObject) -> bytes:
-    """The file; ``extras`` are facts about the motion, which are kept under "asset"."""
+    """Build the file; ``extras`` are facts about the motion, stored under "asset"."""
     return _Document(scene, keys).bytes(generator, extras)
 
 
 class _Document:
-    """The parts of the file, as they are collected. Node 0 turns the up axis."""
+    """Collects the parts of the file. Node 0 turns the up axis."""
 
     def __init__(self, scene: Scene, keys: SceneKeys) -> None:
         self.scene, self.keys = scene, keys
@@ -66,9 +66,9 @@ class _Document:
         self.sides = [s for s in SIDES if any(node.side == s for node in scene.nodes)]
         self.up = np.array(UP_MATRICES[scene.up_axis])
         self.nodes = self._nodes()
-        self.meshes, self.skins = ([], []) if scene.is_markers else self._skinned()
+        self.meshes, self.skins = ([], []) if scene.is_markers else self._skinned_mesh()
         if scene.is_markers:
-            self.meshes = self._knobs()
+            self.meshes = self._marker_meshes()
         self.animations = self._animations()
 
     def bytes(self, generator: str, extras: JsonObject) -> bytes:
@@ -124,7 +124,7 @@ class _Document:
             nodes.append({"name": "bones", "mesh": 0, "skin": 0})
         return nodes
 
-    def _skinned(self) -> tuple[list[JsonObject], list[JsonObject]]:
+    def _skinned_mesh(self) -> tuple[list[JsonObject], list[JsonObject]]:
         """The mesh of the bones, in the world at rest, and its skin."""
         solid, count = solid_of(self.scene), len(self.scene.nodes)
         attributes = self._attributes(solid)
@@ -159,7 +159,7 @@ class _Document:
         data = triangles.reshape(-1, 1).astype(kind)
         return self._accessor(data, code, view=self._view(INDICES))
 
-    def _knobs(self) -> list[JsonObject]:
+    def _marker_meshes(self) -> list[JsonObject]:
         corners = marker_corners(MARKER * self.scene.size).astype("<f4")
         position = self._accessor(corners, FLOAT, True, self._view(VERTICES))
         indices = self._indices(OCTAHEDRON, len(corners))

@@ -104,8 +104,8 @@ class Scene:
 def scene_of(motion: Motion) -> Scene:
     """The scene of ``motion``, whose times are known.
 
-    Raises MotionError for a skeleton without kinematics, for a joint of a skeleton that is missing
-    in a frame, and for so many frames that float32 times would be equal.
+    Raises MotionError for a skeleton without kinematics, for a joint that is missing in a frame,
+    and if float32 times of frames would be equal.
     """
     skeleton, timeline = motion.skeleton, motion.timeline
     assert timeline is not None
@@ -220,7 +220,7 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
 
 
 class _Placements:
-    """Positions of joints (tail -1) and of the loose ends of their bones, (n_frames, 3) in meters.
+    """Positions of joints (tail -1) and of bone tips without a joint, (n_frames, 3) in meters.
 
     ``shifts`` has those that move relative to their parent, along its axes.
     """
@@ -296,7 +296,7 @@ SIDES = ("", "left", "right")
 COLORS = {"": (0.6, 0.6, 0.62), "left": (0.05, 0.25, 0.7), "right": (0.75, 0.2, 0.05)}  # linear
 WIDEST_AT, WIDTH = 0.15, 0.12  # of the bone, from its start, and from its middle
 LEAST_WIDTH, GREATEST_WIDTH = 0.007, 0.03  # of the figure
-KNOB, MARKER = 0.012, 0.008  # radius, of the figure, of the markers' box
+KNOB, MARKER = 0.012, 0.008  # radius relative to the figure, and to the markers' box
 LEAST_BONE = 1e-4  # of the figure; shorter ones are invisible
 
 # Corners: one end, four around, the other end; triangles counterclockwise from outside.

@@ -28,13 +28,13 @@ IDENTIFIER = re.compile(r"[^A-Za-z0-9_]")
 
 
 def build_usda(scene: Scene, keys: SceneKeys, generator: str, facts: JsonObject) -> bytes:
-    """The file, of keys in every frame; ``facts`` about the motion are kept with the layer."""
+    """Build the file, with keys in every frame; the layer keeps ``facts`` about the motion."""
     name = identifiers([scene.name])[0]
     body = _markers(scene, keys) if scene.is_markers else _skeleton(scene, keys, name)
     kind = "Xform" if scene.is_markers else "SkelRoot"
     lines = [*_layer(scene, name, generator, facts), f"def {kind} {quote_text(name)} ("]
     lines.append(f"    displayName = {quote_text(scene.name)}")
-    lines += [")", "{", *_indented(_to_usd_up(scene)), *_indented(body), "}", ""]
+    lines += [")", "{", *_indent(_to_usd_up(scene)), *_indent(body), "}", ""]
     return "\n".join(lines).encode("utf-8", "replace")
 
 
@@ -86,9 +86,9 @@ def _markers(scene: Scene, keys: SceneKeys) -> Iterator[str]:
         yield f"    double3 xformOp:translate = {_tuple(_float32(node.rest))}"
         if shifts is not None:
             rows = (_tuple(row) for row in shifts.values)
-            yield from _indented(_samples("double3 xformOp:translate", scene, shifts.frames, rows))
+            yield from _indent(_samples("double3 xformOp:translate", scene, shifts.frames, rows))
         yield '    uniform token[] xformOpOrder = ["xformOp:translate"]'
-        yield from _indented(_visibility(scene, node))
+        yield from _indent(_visibility(scene, node))
         yield "}"
 
 
@@ -144,7 +144,7 @@ def _animation(
         if still:
             yield f"    {label} = {next(rows)}"
         else:
-            yield from _indented(_samples(label, scene, frames, rows))
+            yield from _indent(_samples(label, scene, frames, rows))
     yield "}"
 
 
@@ -190,7 +190,7 @@ def _mesh(solid: Solid, name: str) -> Iterator[str]:
 
 
 def _paths(scene: Scene) -> list[str]:
-    """The path of every joint below its root, of valid names of USD."""
+    """The path of every joint below its root, made of valid USD names."""
     paths: list[str] = []
     for node, name in zip(scene.nodes, identifiers([n.name for n in scene.nodes]), strict=True):
         paths.append(name if node.parent < 0 else f"{paths[node.parent]}/{name}")
@@ -237,7 +237,7 @@ def _samples(
     yield "}"
 
 
-def _indented(lines: Iterable[str]) -> Iterator[str]:
+def _indent(lines: Iterable[str]) -> Iterator[str]:
     return (f"    {line}" for line in lines)
 
 
