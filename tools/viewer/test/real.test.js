@@ -123,7 +123,7 @@ test("damaged files: what is lost is marked in time, the others are shown", { sk
   writeFileSync(out, bytes);
   await served([out], async (page) => {
     await page.waitForFunction(() => /are lost/.test(document.querySelector(".strip.marks canvas")?.ariaLabel ?? ""));
-    assert.match(await page.textContent("#panel-info"), /frames \d+ to \d+ are lost/);
+    assert.match(await page.textContent("#panel-info"), /frames [\d,]+ to [\d,]+ are lost/);
     assert.ok((await inked(page, ".strip.marks canvas")).pixels > 500);
   });
 });
