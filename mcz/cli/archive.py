@@ -102,7 +102,7 @@ def _pack_function(scheduler: str | None) -> Callable[..., Report]:
     "sources", metavar="SRC...", nargs=-1, required=True, type=click.Path(readable=False)
 )
 @click.argument("target", metavar="FILE.mcz", type=click.Path(readable=False))
-@shared_options.skeleton("Use this ASF for the AMCs, or none.")
+@shared_options.skeleton("Use this ASF for the AMCs; none: read them without one.")
 @click.option(
     "--root",
     metavar="DIR",
@@ -152,7 +152,7 @@ def append_command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Append SRC... to FILE.mcz; when one of them cannot be added, none is.
+    """Append SRC... to FILE.mcz, all or none.
 
     SRC is a motion file, a folder of motion files, or an .mcz, whose contents are copied unchanged.
 
@@ -201,8 +201,8 @@ def append_command(
     type=click.Choice(("stored", "portable", "strict")),
     default="stored",
     show_default=True,
-    help="Handle names that some systems cannot store, or would confuse: write them as stored if "
-    "possible, write portable names, or refuse.",
+    help="Handle names that some systems cannot store: write them as stored if possible, write "
+    "portable names, or refuse them (strict).",
 )
 @click.option(
     "--mtimes", is_flag=True, help="Restore the modification times that pack --mtimes kept."
@@ -224,11 +224,11 @@ def unpack_command(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
+    """Write every source file and attachment of FILE.mcz below DIR, under its original path.
 
-    With --clip or --where, write only the files of those clips and of their skeletons. Links in DIR
-    are not followed, and no file replaces another of FILE.mcz. With --salvage, write the intact
-    files of a damaged FILE.mcz; each is verified.
+    --clip and --where write only the files of those clips and of their skeletons. --salvage writes
+    the intact files of a damaged FILE.mcz; each is verified. Links in DIR are not followed, and no
+    file replaces another of FILE.mcz.
     """
     import mcz
 
@@ -261,7 +261,7 @@ def unpack_command(
 )
 @shared_options.clips
 @shared_options.where
-@shared_options.rate()
+@shared_options.rate("Set the frame rate of clips that state none (120, 29.97, 30000/1001).")
 @shared_options.unit("clips that state none")
 @shared_options.key_error
 @shared_options.max_decoded

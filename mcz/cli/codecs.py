@@ -130,7 +130,7 @@ AXES = "xyz"
     metavar="N",
     type=click.IntRange(0, 10_000),
     default=40,
-    help="Iterate N times with each smaller P before; 0: the published algorithm. Default: 40.",
+    help="First iterate N times with each smaller P; 0: the published algorithm. Default: 40.",
 )
 @click.option(
     "--start",
@@ -228,8 +228,8 @@ PAPERS = "python -m tools.papers"
 @click.option(
     "--codecs",
     metavar="A,B",
-    help="Compare these codecs, each with its presets; qbc:khan2014 or qbc:delta=40 is that "
-    "setting alone. Default: all.",
+    help="Compare these codecs, each with its presets; qbc:khan2014 or qbc:delta=40 is one "
+    "setting. Default: all.",
 )
 @click.option("--tables", "paper", hidden=True)  # an internal option of tools/papers
 @click.option("--peers", is_flag=True, help="Add the general compressors that are installed.")
@@ -265,9 +265,9 @@ def bench_command(
 
     Without CLIPS, use a generated walk.
 
-    Print compression ratios over three numerators, errors of channels and positions, comparisons
-    at equal error and at equal size, Bjontegaard deltas, speed relative to parsing the text, and
-    memory. Results are cached in the user's cache folder; speeds are measured one at a time.
+    Print compression ratios, errors of channels and positions, comparisons at equal error and at
+    equal size, Bjontegaard deltas, speed relative to parsing the text, and memory. Results are
+    cached in the user's cache folder; speeds are measured one at a time.
     """
     from mcz.bench.report import bench
     from mcz.bench.tasks import Cache, Runner, default_folder

@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     metavar="K",
     type=click.IntRange(min=0),
     default=0,
-    help="Leave out the K finest details.",
+    help="Leave out the K finest resolutions.",
 )
 @click.option(
     "--decimate",
@@ -104,7 +104,7 @@ if TYPE_CHECKING:
 @click.option(
     "--stored",
     is_flag=True,
-    help="Write stored words instead of values in units (with --signal).",
+    help="Write the numbers as stored, not in units (with --signal).",
 )
 @shared_options.up("Set the up axis of a clip that states none (with --to c3d, glb or usda).")
 @shared_options.unit("a clip that states none (with --to another format)")
@@ -252,9 +252,7 @@ OF_SOURCES = ("skeleton", "arrays", "model")
 @click.option(
     "--joints", metavar="a,b", help="Write only these joints, by name or index (to csv or npz)."
 )
-@shared_options.skeleton(
-    "Use this ASF for an AMC, or none. Default: the one beside it, as in mcz encode."
-)
+@shared_options.skeleton(f"{shared_options.SKELETON_HELP} Default: found as in mcz encode.")
 @shared_options.rate(ITS_RATE_HELP)
 @shared_options.unit("a file that states none")
 @shared_options.up("Set the up axis of a file that states none.")

@@ -13,7 +13,6 @@ import click
 
 from mcz.cli import shared_options
 from mcz.cli.common import (
-    EXIT_CODES,
     Exit,
     Failure,
     errors_about,
@@ -45,7 +44,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     return () if value is None else tuple(name.strip() for name in value.split(",") if name.strip())
 
 
-@click.command(short_help="Measure how far one motion is from another.", epilog=EXIT_CODES)
+@click.command(short_help="Measure how far one motion is from another.")
 @click.argument("a", metavar="A", type=click.Path(readable=False))
 @click.argument("b", metavar="B", type=click.Path(readable=False))
 @click.option(
@@ -58,7 +57,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
 @shared_options.where
 @shared_options.frames("Use only frames A <= f < B of both, counted from 0.")
 @shared_options.unit("a file that states none")
-@shared_options.skeleton("Use this ASF for an AMC, or none.")
+@shared_options.skeleton(shared_options.SKELETON_HELP)
 @shared_options.rate()
 @shared_options.up("Set the up axis of a file that states none.")
 @shared_options.arrays
@@ -70,7 +69,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     type=float,
     default=3.0,
     callback=_to_radius,
-    help="Set the radius of the shell around joints. Default: 3.",
+    help="Set the radius of the shell, three points around each joint. Default: 3.",
 )
 @click.option("--by-joint", is_flag=True, help="Print the distances of every joint.")
 @click.option("--contacts", is_flag=True, help="Print every contact of a foot with the floor.")

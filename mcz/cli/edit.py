@@ -74,7 +74,7 @@ def extract_command(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Cut frames, joints or the finest resolutions out of IN.mcz, without re-encoding.
+    """Write some frames or joints of IN.mcz, or fewer resolutions, without re-encoding.
 
     Streams are copied byte for byte, so OUT.mcz has the values that IN.mcz has for the same frames,
     joints and resolution. Some codecs code all joints together: see --recode. The quality record

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 INPUT_FORMATS = "bvh amc c3d asf trc mot sto csv mvnx npy npz pickle torch".split()
 
 
-@click.command(short_help="Encode a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npz or .pkl.")
+@click.command(short_help="Encode a motion file: .bvh, .amc, .c3d, .trc, .csv, .npz, ...")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.argument("more", metavar="", nargs=-1, type=click.Path(readable=False))
 @click.option(
@@ -41,7 +41,7 @@ INPUT_FORMATS = "bvh amc c3d asf trc mot sto csv mvnx npy npz pickle torch".spli
     help="Write to a file, a folder, or - for standard output. Default: SRC with the suffix .mcz.",
 )
 @shared_options.skeleton(
-    "Use this ASF for an AMC, or none. Default: an ASF beside the AMC or in a sibling folder asf/ "
+    f"{shared_options.SKELETON_HELP} Default: an ASF beside the AMC or in a sibling folder asf/ "
     "with the name of the take or the subject, or the only one whose bones fit."
 )
 @click.option(
@@ -69,8 +69,8 @@ def encode_command(
 ) -> Exit:
     """Encode SRC into OUT.mcz.
 
-    SRC is a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .mvnx, .npy, .npz or .pkl. An ASF gives
-    an .mcz with only a skeleton.
+    SRC is a .bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv, .tsv, .mvnx, .npy, .npz, .pkl or .pt.
+    An ASF gives an .mcz with only a skeleton.
 
     Use - as SRC to read standard input. Codecs that work frame by frame (lsdt-frame, or posewave
     with levels=0) then write each frame of a BVH or AMC before reading the next. Their default

@@ -92,8 +92,7 @@ def info_command(
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz.
 
-    For a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv, .mvnx, .npy, .npz, .pkl),
-    show its skeleton and clip.
+    For a source file of any format, show its skeleton and clip.
     """
     from mcz.files.reading.file import is_source
     from mcz.files.reading.report import info

@@ -65,7 +65,7 @@ COMMANDS = {  # name: module and function
 
 @click.command(
     cls=lazy_group(COMMANDS),
-    help="Compress motion capture files (BVH, ASF, AMC, C3D, TRC, MOT, STO) and restore them byte "
+    help="Compress motion capture files (BVH, AMC, C3D, TRC, CSV, NPZ, ...) and restore them byte "
     "for byte.\n\n"
     "Every command has its own --help. Nothing is overwritten without --force.",
     epilog=EXIT_CODES,

@@ -224,8 +224,8 @@ def _to_pairs(
 @click.option("--skip-unknown", is_flag=True, help="Ignore rows that match no clip.")
 @click.option(
     "--rate", metavar="R", callback=to_rate,
-    help="Set the frame rate of clips whose source states none (AMC); rewrites the file. Default: "
-    "all clips with unknown rate."
+    help="Set the frame rate of clips whose source states none (AMC), by default of all whose rate "
+    "is unknown; rewrites the file."
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Change a known rate.")
 @click.option(

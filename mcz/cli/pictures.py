@@ -13,7 +13,6 @@ import click
 
 from mcz.cli import shared_options
 from mcz.cli.common import (
-    EXIT_CODES,
     Exit,
     Failure,
     check_new,
@@ -39,7 +38,7 @@ motion_options = shared_options.combine(
     shared_options.rate(),
     shared_options.unit("a file that states none"),
     shared_options.up("Set the up axis of a file that states none."),
-    shared_options.skeleton("Use this ASF for an AMC, or none."),
+    shared_options.skeleton(shared_options.SKELETON_HELP),
     shared_options.arrays,
     shared_options.model,
     shared_options.max_decoded,
@@ -94,7 +93,7 @@ def to_size(
     return int(match[1]), int(match[2] or match[1])
 
 
-@click.command(short_help="Render a motion as GIF, MP4, WebM, PNG or SVG.", epilog=EXIT_CODES)
+@click.command(short_help="Render a motion as GIF, MP4, WebM, PNG or SVG.")
 @click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @click.option(
     "-o",
@@ -108,7 +107,9 @@ def to_size(
 @click.option(
     "--fps", metavar="R", type=float, help="Set the pictures per second. Default: GIF 25, else 30."
 )
-@click.option("--speed", metavar="X", type=float, default=1.0, help="Set the speed. Default: 1.")
+@click.option(
+    "--speed", metavar="X", type=float, default=1.0, help="Play X times as fast. Default: 1."
+)
 @click.option(
     "--size", metavar="WxH", callback=to_size, help="Set the size in pixels. Default: 640x640."
 )
@@ -116,7 +117,7 @@ def to_size(
     "--view",
     type=click.Choice(VIEWS),
     default="three-quarter",
-    help="Set the view, relative to the figure's first facing. Default: three-quarter.",
+    help="Look from this side of the figure, as it faces at first. Default: three-quarter.",
 )
 @click.option(
     "--theme", type=click.Choice(("light", "dark")), default="light", help="Set the colors."
@@ -141,12 +142,12 @@ def render_command(
 ) -> Exit:
     """Draw the motion in FILE: a film, a still or a sheet of poses.
 
-    FILE is an .mcz, .bvh, .amc, .c3d, .trc, .csv of Motive or Vicon, or .npz; a .mot, a .sto and
-    other .csv have no points to draw. A plain .npy needs --arrays.
+    FILE is an .mcz or a source file with joints or markers. A .mot, a .sto and plain columns of
+    numbers have no points to draw; plain arrays need --arrays.
 
     A .png or .svg without --sheet shows the middle frame of --frames. The picture states the
     spacing of the floor grid, and colors left and right differently. Requires pip install
-    'mcz[render]'.
+    'mcz[plot]', or 'mcz[render]' for .mp4 and .webm.
     """
     import mcz
     from mcz.files.writing.atomic import refuse_inputs
@@ -188,9 +189,7 @@ MOST_ROWS = 24  # of a table that is printed
 MOST_TEXT = 120  # characters of a name that is printed
 
 
-@click.command(
-    short_help="Plot channels, errors, spectra or bytes as PNG, SVG or a page.", epilog=EXIT_CODES
-)
+@click.command(short_help="Plot channels, errors, spectra or bytes as PNG, SVG or a page.")
 @click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @click.argument("other", metavar="[FILE2]", required=False, type=click.Path(readable=False))
 @click.option(

@@ -29,11 +29,10 @@ def delete_command(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Delete clips, attachments or aliases from FILE.mcz, with everything that only they need.
+    """Delete clips, attachments or aliases from FILE.mcz, and what no other clip needs.
 
-    The new file contains none of their bytes, skeletons, templates, models and metadata, except
-    those that other clips share. Other copies of FILE.mcz, and remains of the old file on the disk
-    or in a backup, are not affected.
+    The new file contains none of their bytes: values, skeletons, templates, models, metadata. Other
+    copies of FILE.mcz, and remains of the old file on the disk or in a backup, are not affected.
     """
     import mcz
 
@@ -55,9 +54,10 @@ def delete_command(
 def rename_command(
     file: str, names: tuple[str, ...], output: str | None, force: bool, as_json: bool
 ) -> Exit:
-    """Rename the clip, attachment or alias OLD to NEW (pairs repeatable; names may be swapped).
+    """Rename the clip, attachment or alias OLD to NEW; more pairs may follow.
 
-    A source with the name of its clip is renamed too, and unpack writes it under the new name.
+    Names may be swapped. A source with the name of its clip is renamed too, and unpack writes it
+    under the new name.
     """
     import mcz
 

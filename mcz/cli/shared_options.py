@@ -16,6 +16,7 @@ from mcz.cli.terminal import echo
 from mcz.model.types import JsonObject, Settings
 
 EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
+SKELETON_HELP = "Use this ASF for an AMC; none: read it without one."
 RATE_HELP = "Set the frame rate of files that state none (120, 29.97, 30000/1001)."
 ITS_RATE_HELP = "Set the frame rate (120, 29.97, 30000/1001), replacing the one in the source."
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}  # cm, as for the codec posewave
@@ -189,8 +190,8 @@ def copies(default: str) -> Callable[[Function], Function]:
     return click.option(
         "--copies/--no-copies",
         default=None,
-        help="Store skeletons, templates and similar parts twice; --salvage then survives a "
-        f"flipped bit in them. Default: {default}.",
+        help="Store skeletons, templates and similar parts twice, so that a flipped bit in them "
+        f"costs no clip. Default: {default}.",
     )
 
 
@@ -271,7 +272,7 @@ ROBOTS = ("unitree-g1-29", "unitree-g1-23", "unitree-h1", "unitree-h1-2", "boost
 arrays = click.option(
     "--arrays",
     type=click.Choice((*ARRAYS, *ROBOTS)),
-    help="Set the meaning of the numbers of a plain .npy, .npz or .pkl, or name a robot's columns.",
+    help="Set the meaning of the numbers of a plain array, or name a robot's columns.",
 )
 
 model = click.option(
@@ -285,8 +286,8 @@ key_error = click.option(
     "--key-error",
     metavar="MM",
     type=click.FloatRange(min=0),
-    help="Drop animation keys while the error stays within MM (with --to glb). 0: keep a key in "
-    "every frame. Default: 0.1, or 1/20,000 of the figure if its unit is unknown.",
+    help="Drop animation keys while the error stays within MM (with --to glb); 0 keeps all. "
+    "Default: 0.1, or 1/20,000 of the figure if its unit is unknown.",
 )
 
 
@@ -363,7 +364,7 @@ def encoding(function: Function) -> Function:
             "--profile",
             type=click.Choice(("small", "base", "large")),
             default="base",
-            help="Set the limits of the file; small is for embedded readers.",
+            help="Set the limits of the file; small is for embedded readers. Default: base.",
         ),
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from mcz.cli import shared_options
 from mcz.cli.command_groups import lazy_group
-from mcz.cli.common import EXIT_CODES, OPTION_HINTS, Exit, Failure, errors_about, require_file
+from mcz.cli.common import OPTION_HINTS, Exit, Failure, errors_about, require_file
 from mcz.cli.standard_input import (
     NAME,
     NUMBER,
@@ -46,8 +46,7 @@ COMMANDS = {"encode": "stream.stream_encode_command", "decode": "stream.stream_d
 @click.command(
     cls=lazy_group(COMMANDS),
     name="stream",
-    short_help="Encode frames as they come: rows of numbers to a live stream, and back.",
-    epilog=EXIT_CODES,
+    short_help="Encode rows of numbers to a live stream, and decode it.",
 )
 def stream_command() -> None:
     """Encode or decode frames as they arrive, over a pipe or TCP."""

@@ -68,9 +68,8 @@ def verify_command(
 ) -> Exit:
     """Check every checksum, decode everything, restore every source and compare its SHA-256.
 
-    With --where, check every checksum, but decode only the selected clips. With --quick, check only
-    checksums and index. For a BAG (a BagIt folder of mcz bag or another tool), check each file
-    against the manifests, then each .mcz in it.
+    --where decodes only the selected clips, and still checks every checksum. A BAG is a BagIt
+    folder of mcz bag or another tool: each file is checked against the manifests, then each .mcz.
     """
     if quick and (where is not None or source is not None):
         raise Failure("--quick decodes nothing, so it excludes --where and --source", Exit.USAGE)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mcz.cli import shared_options
-from mcz.cli.common import EXIT_CODES, OPTION_HINTS, Exit, Failure, check_new, errors_about
+from mcz.cli.common import OPTION_HINTS, Exit, Failure, check_new, errors_about
 from mcz.cli.outputs import resolve_output
 from mcz.cli.shared_options import EFFORTS, to_bytes
 from mcz.cli.terminal import echo, plural, print_json, say, say_json
@@ -35,9 +35,7 @@ OF_SERVER = ("no_browser", "keep", "host", "port")
 LOOPBACK = "127.0.0.1"
 
 
-@click.command(
-    short_help="Show motions in the browser, or write a page to mail.", epilog=EXIT_CODES
-)
+@click.command(short_help="Show motions in the browser, or write a page to mail.")
 @click.argument(
     "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(readable=False)
 )
@@ -63,7 +61,7 @@ LOOPBACK = "127.0.0.1"
     default=0,
     help="Listen on this port. Default: any free one.",
 )
-@shared_options.skeleton("Use this ASF for an AMC, or none. Default: found as in mcz encode.")
+@shared_options.skeleton(f"{shared_options.SKELETON_HELP} Default: found as in mcz encode.")
 @shared_options.rate()
 @shared_options.unit("a file that states none")
 @shared_options.up("Set the up axis of a file that states none.")
@@ -91,10 +89,10 @@ LOOPBACK = "127.0.0.1"
 @shared_options.threads
 @shared_options.json
 def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **options: Any) -> Exit:
-    """Show motions in the browser: files, folders of them, URLs of an .mcz.
+    """Show motions in the browser: files, folders, or URLs of an .mcz.
 
-    Files are .mcz, .bvh, .amc, .c3d, .trc, .csv, .mot, .sto, .mvnx, .npy, .npz and .pkl.
-    Files without points appear as curves.
+    FILE is an .mcz, a source file of any format, or a folder of them. A file without points appears
+    as curves.
 
     A local server serves the page and the files to this machine only, at an unguessable address. It
     stops a few seconds after the last page is closed, or at Ctrl-C.
