@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import doctest
+import inspect
 import io
 import json
 import re
@@ -285,6 +286,12 @@ def test_public_names_are_in_the_manual() -> None:
     assert not [name for name in mcz.__all__ if not re.search(rf"\b{name}\b", pages)]
     listed = re.findall(r"^\.\. auto\w+:: (\w+)$", text_of(API), re.M)
     assert sorted(listed) == sorted(mcz.__all__)
+
+
+def test_the_table_of_functions_is_complete() -> None:
+    table = (ROOT / "docs/reference/python.md").read_text("utf-8").partition("## Functions")[2]
+    names = {name for name in dir(mcz) if inspect.isfunction(getattr(mcz, name)) and name[0] != "_"}
+    assert names <= set(re.findall(r"`(\w+)`", table))
 
 
 def test_the_index_lists_every_page() -> None:
