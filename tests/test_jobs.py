@@ -193,7 +193,7 @@ def pool() -> Iterator[Pool]:
 
 def test_answers_come_in_order(pool: Pool) -> None:
     items = [0, None, 1, None, 2, 3, 4, 5, 6]
-    found = [answer and answer() for answer in pool.in_order(join_state, items)]
+    found = [answer and answer() for answer in pool.map_in_order(join_state, items)]
     assert found == [None if item is None else ("state", item) for item in items]
     assert len(pool.pids) == 2
 
@@ -206,13 +206,13 @@ def test_few_items_are_taken_ahead(pool: Pool) -> None:
             taken.append(item)
             yield item
 
-    found = pool.in_order(join_state, items())
+    found = pool.map_in_order(join_state, items())
     assert next(found) is not None
     assert len(taken) <= 6
 
 
 def test_errors_come_as_they_were(pool: Pool) -> None:
-    for answer in pool.in_order(fails, [1, 2]):
+    for answer in pool.map_in_order(fails, [1, 2]):
         assert answer is not None
         with pytest.raises(mcz.TruncatedError, match="item") as caught:
             answer()
@@ -220,13 +220,13 @@ def test_errors_come_as_they_were(pool: Pool) -> None:
 
 
 def test_what_a_dead_process_had_is_done_again(pool: Pool, tmp_path: Path) -> None:
-    (answer,) = pool.in_order(dies_once, [tmp_path / "mark"])
+    (answer,) = pool.map_in_order(dies_once, [tmp_path / "mark"])
     assert answer is not None
     assert answer() != os.getpid()
 
 
 def test_a_process_that_dies_again_is_an_error(pool: Pool) -> None:
-    (answer,) = pool.in_order(dies, [1])
+    (answer,) = pool.map_in_order(dies, [1])
     assert answer is not None
     with pytest.raises(mcz.WorkerError, match=r"ended unexpectedly \(signal 9\), 2 times"):
         answer()
@@ -271,7 +271,7 @@ import operator, time
 from mcz.files.jobs import Pool
 
 with Pool(2) as pool:
-    for answer in pool.in_order(operator.eq, [1, 2]):
+    for answer in pool.map_in_order(operator.eq, [1, 2]):
         answer()
     print(*pool.pids, flush=True)
     time.sleep(60)

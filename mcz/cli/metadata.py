@@ -71,9 +71,9 @@ def list_command(
     with open_input(file, salvage=salvage) as opened_file, errors_about(file):
         clips = opened_file.select_clips(where=where)
         if sort is not None:
-            from mcz.files.editing.reorganize import in_order
+            from mcz.files.editing.reorganize import sort_clips
 
-            clips = in_order(opened_file, clips, sort)
+            clips = sort_clips(opened_file, clips, sort)
         rows = _rows(opened_file, clips, names)
         totals = _totals(clips)
         whole = where is None and names is None

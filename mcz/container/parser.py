@@ -82,7 +82,7 @@ class Parser:
     """The state of a parser, which is fed with bytes and asked for events.
 
     ``size`` is the size of the file, None if unknown until ``end``. ``want`` returns the number of
-    bytes of a payload that its event needs, ``WHOLE_PAYLOAD`` or ``UNCHECKED``; with ``check`` the
+    bytes of a payload that its event needs, ``WHOLE`` or ``UNCHECKED``; with ``check`` the
     others are read too, for the checksum.
 
     The thing at ``at`` is next, in the state ``state`` of the grammar. After a Fault the parser

@@ -117,7 +117,7 @@ class Cluster:
             raise WorkerError("the cluster has no worker", path=self._client.scheduler.address)
         return int(n_threads)
 
-    def in_order(
+    def map_in_order(
         self, function: Callable[[Any, Item], Result], items: Iterable[Item | None], state: object
     ) -> Generator[Answer[Result] | None, None, None]:
         """Yield ``function(state, item)`` for each item, in order; for None, None."""
@@ -271,7 +271,7 @@ def pack(
     asks = (RemoteFile(root, entry, skeletons_beside(entry.name, skeletons)) for entry in entries)
     with connect(client) as used, replacing(target, force=force, inputs=inputs) as stream:
         transaction = WriteTransaction(stream, limits, copies=copies)
-        with closing(Cluster(used).in_order(encode_remotely, asks, limits)) as answers:
+        with closing(Cluster(used).map_in_order(encode_remotely, asks, limits)) as answers:
             results = cast(Iterator[Answer[Part]], answers)  # no item is None
             made = zip(entries, results, names, strict=True)
             parts = (RemotePart(entry, answer, one.size) for entry, answer, one in made)

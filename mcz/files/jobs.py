@@ -53,7 +53,7 @@ class Engine(Protocol):
     @property
     def jobs(self) -> int: ...
 
-    def in_order(
+    def map_in_order(
         self, function: Callable[[Any, Item], Result], items: Iterable[Item | None], state: object
     ) -> Generator[Answer[Result] | None, None, None]: ...
 
@@ -143,7 +143,7 @@ class Pool:
         with self._lock:
             return [worker.process.pid for worker in self._workers]
 
-    def in_order(
+    def map_in_order(
         self, function: Callable[[Any, Item], Result], items: Iterable[Item | None]
     ) -> Iterator[Answer[Result] | None]:
         """Yield ``function(state, item)`` for each item, in order; for None, None.
@@ -254,14 +254,14 @@ def answers(
     jobs: int,
     state: object = None,
 ) -> Iterator[Iterator[Answer[Result] | None]]:
-    """``Pool.in_order`` of a pool for this call, or of the engine in use."""
+    """``Pool.map_in_order`` of a pool for this call, or of the engine in use."""
     in_use = engine()
     if in_use is not None:
-        with closing(in_use.in_order(function, items, state)) as results:
+        with closing(in_use.map_in_order(function, items, state)) as results:
             yield results
         return
     with Pool(jobs, state) as pool:
-        yield pool.in_order(function, items)
+        yield pool.map_in_order(function, items)
 
 
 LENGTH = 8

@@ -192,7 +192,7 @@ class SignKeeper:
 
 
 def nearest(vectors: Floats, target: Floats, full: float) -> Floats:
-    """Return the equivalent rotation vectors, (n, 3), nearest to ``wanted``."""
+    """Return the equivalent rotation vectors, (n, 3), nearest to ``target``."""
     counts, axes = _turns(vectors, target, full)
     return np.where(counts[:, None] == 0, vectors, vectors + (full * counts)[:, None] * axes)
 

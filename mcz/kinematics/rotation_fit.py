@@ -93,15 +93,15 @@ def _angle_by_angle(axes: list[int], moment: Floats) -> Floats:
         angles[-1:] = start
         for _ in range(SWEEPS if len(axes) > 1 else 1):
             for k, axis in enumerate(axes):
-                between = moment
-                for before in range(k):  # undo the turns on the left, outermost first
-                    between = _rotate_left(between, axes[before], -angles[before])
-                for after in range(len(axes) - 1, k, -1):
-                    between = rotate_axes(between, axes[after], -angles[after])
+                rest = moment
+                for left in range(k):  # undo the turns on the left, outermost first
+                    rest = _rotate_left(rest, axes[left], -angles[left])
+                for right in range(len(axes) - 1, k, -1):
+                    rest = rotate_axes(rest, axes[right], -angles[right])
                 i, j = (axis + 1) % 3, (axis + 2) % 3
-                sine, cosine = between[j, i] - between[i, j], between[i, i] + between[j, j]
+                sine, cosine = rest[j, i] - rest[i, j], rest[i, i] + rest[j, j]
                 angles[k] = np.arctan2(sine, cosine)
-                trace = np.hypot(sine, cosine) + between[axis, axis]
+                trace = np.hypot(sine, cosine) + rest[axis, axis]
         better = trace > most * (1 + 1e-9) + 1e-300
         best, most = np.where(better, angles, best), np.where(better, trace, most)
     return np.asarray(np.unwrap(best, axis=1))
@@ -124,8 +124,8 @@ def polish_turns(link: Link, target: Floats, columns: Floats, radians: float) ->
     The joint has only angles about axes. ``target`` are rotation matrices (3, 3, F) along the
     joint's own axes.
     """
-    axes, own = [axis for axis, _ in link.turns], link.angles
-    angles = columns[own] * radians
+    axes, columns_of_turns = [axis for axis, _ in link.turns], link.angles
+    angles = columns[columns_of_turns] * radians
     damping = np.full(angles.shape[1], START_DAMPING)
     turn, spins = _turn(axes, angles)
     near = _nearness(turn, target)
@@ -144,7 +144,7 @@ def polish_turns(link: Link, target: Floats, columns: Floats, radians: float) ->
         near = np.where(better, trial_near, near)
         turn, spins = (np.where(better, trial_turn, turn), np.where(better, trial_spins, spins))
         damping *= np.where(better, EASIER, HARDER)
-    columns[own] = angles / radians
+    columns[columns_of_turns] = angles / radians
 
 
 def _turn(axes: list[int], angles: Floats) -> tuple[Floats, Floats]:

@@ -36,6 +36,7 @@ def quarters(value: int) -> int:
 
 
 def clamp(value: int, low: int, high: int) -> int:
+    """``value``, or the nearer bound if it is outside of [low, high]."""
     return min(max(value, low), high)
 
 
@@ -118,8 +119,9 @@ def code_length(
     return -1
 
 
-def octave(quarters_of: int) -> int:
-    return 0 if quarters_of < 28 else (quarters_of - 24) >> 2
+def octave(quarter: int) -> int:
+    """Octave of a size in quarters of octaves, see ``quarters``; 0 up to 27 of them."""
+    return 0 if quarter < 28 else (quarter - 24) >> 2
 
 
 def code_size(

@@ -32,10 +32,10 @@ def code_point(
     state: Ints, data: Bytes, point: Ints, predicted: Ints, tracks: Ints2, first: tuple[int, int]
 ) -> int:
     """Code the channels of one control point in place; 1 if that is impossible."""
-    near, other = 0, 3
+    near, other_side = 0, 3
     for c in range(len(point)):
         track = tracks[c]
-        sides = track[SIDE_1], track[SIDE_2], other
+        sides = track[SIDE_1], track[SIDE_2], other_side
         scales = track[FAST], track[SLOW]
         error = code_residual(
             state, data, point[c] - predicted[c], scales, clamp(near + 3, 0, 7), sides, first
@@ -48,7 +48,7 @@ def code_point(
         track[FAST] += (size - track[FAST]) >> 1
         track[SLOW] += (size - track[SLOW]) >> 4  # QBC-18
         track[SIDE_2] = track[SIDE_1]
-        track[SIDE_1] = other = side_of(error)  # QBC-18
+        track[SIDE_1] = other_side = side_of(error)  # QBC-18
     return 0
 
 
@@ -97,7 +97,7 @@ def code_details(
     for kind in range(2):
         tracks[kind, :, FAST] = tracks[kind, :, SLOW] = scales[kind] << 4
     predicted = np.zeros(n_channels, np.int64)
-    usual = 0  # curves between the marks before
+    n_before = 0  # curves between the marks before
     curve = 0
     for k in range(len(frames) - 1):
         left = frames[k + 1] - frames[k]
@@ -106,7 +106,7 @@ def code_details(
         while left:
             if curve >= len(lengths):
                 return -1
-            length = code_length(state, data, lengths[curve], left, n_here, usual)
+            length = code_length(state, data, lengths[curve], left, n_here, n_before)
             if length < 1:
                 return -1
             lengths[curve] = length
@@ -135,16 +135,18 @@ def code_details(
             left -= length
             n_here += 1
             curve += 1
-        usual = n_here  # QBC-23
+        n_before = n_here  # QBC-23
     return curve
 
 
-def code_length(state: Ints, data: Bytes, length: int, left: int, n_here: int, usual: int) -> int:
+def code_length(
+    state: Ints, data: Bytes, length: int, left: int, n_here: int, n_before: int
+) -> int:
     """Code the length of a curve, at most ``left`` frames up to the next mark; 0 for a fault."""
     if left == 1:
         return 1
     a = C_LAST + min(bits(left), 15)
-    b, c = C_LAST + 16 + min(n_here, 7), C_LAST + 24 + clamp(usual - n_here, 0, 7)
+    b, c = C_LAST + 16 + min(n_here, 7), C_LAST + 24 + clamp(n_before - n_here, 0, 7)
     if code_mixed(state, data, 1 if length == left else 0, M_LAST, a, b, c):
         return left
     half = left >> 1

@@ -126,7 +126,7 @@ def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> byt
     if len(plan.lanes.numbers):
         leads = np.ascontiguousarray(plan.lanes.leads.T)
         chosen = choose_references(leads, best_kernels.MOST_REFERENCES, best_kernels.MOST_IN_ALL)
-        echoes = _echoes_of(plan, leads)
+        echoes = _usable_echoes(plan, leads)
         for repeated in ([], echoes) if echoes else ([],):
             stream = code_plan(plan, chosen, repeated)
             if _work(chosen, len(leads)) <= WORK_OF_BYTE * (len(stream) + SPARE):
@@ -136,7 +136,7 @@ def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> byt
     return min(streams, key=len)
 
 
-def _echoes_of(plan: Plan, leads: Words) -> list[Echo]:
+def _usable_echoes(plan: Plan, leads: Words) -> list[Echo]:
     """Find echoes in the lanes whose ordinals equal their leads and tails."""
     numbers = plan.lanes.numbers
     is_whole = plan.channels.plans[numbers, survey_kernels.LIMIT] < 0

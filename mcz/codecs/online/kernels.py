@@ -270,7 +270,7 @@ def _quantize(indices: Ints, coefficients: Floats, ratio: float, threshold: floa
 def _choose(
     indices: Ints, coefficients: Floats, target: float, threshold: float, is_fixed: bool
 ) -> tuple[int, float]:
-    """Choose the step code next to ``wanted``, fill ``indices``; also return the mean square.
+    """Choose the step code next to ``target``, fill ``indices``; also return the mean square.
 
     If the step is not fixed, it grows until no coefficient is too large.
     """

@@ -28,7 +28,7 @@ LEANING, STANDING = 1, 2  # a point before or after a contact, and in one
 def place_points(
     plan: Plan, points: HeldPoints, lanes: Lanes, values: Floats2, positions: Floats3
 ) -> None:
-    """Fill ``found`` (n_points, n_frames, 3) with places in frames ``values`` (n_frames, ...)."""
+    """Fill ``positions`` (n_points, n_frames, 3) from the frames ``values`` (n_frames, ...)."""
     for n in range(positions.shape[1]):
         place_joints(plan, values, n, lanes, 1)
         for k in range(len(points.joints)):
@@ -195,7 +195,7 @@ def _note_pulls(
 
 
 def _solve(pulls: Floats2, solution: Floats, square: Floats2, pivots: Floats, n: int) -> None:
-    """Solve (pulls pulls' + damping) x = wanted by L D L'; ``wanted`` is overwritten."""
+    """Solve (pulls pulls' + damping) x = ``solution`` by L D L', in place."""
     trace = 0.0
     for i in range(n):
         for k in range(i + 1):

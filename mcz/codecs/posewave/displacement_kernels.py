@@ -86,9 +86,9 @@ def code_point(
 ) -> int:
     """Code the contacts of a point, in place; -1, or the frame where one is impossible.
 
-    ``places`` (n_frames + 2, 3), the first and the last of them twice, ``wanted`` (n_frames, 3),
+    ``places`` (n_frames + 2, 3), the first and the last of them twice, ``target`` (n_frames, 3),
     displacements, and ``radii`` (n_frames,) are in length units. An encoder chooses cheap
-    displacements no farther than ``radii`` from ``wanted``.
+    displacements no farther than ``radii`` from ``target``.
     """
     stands, starts, moves = contacts.stands, contacts.starts, contacts.moves
     n_frames, before = len(stands), 0
@@ -272,7 +272,7 @@ def _solve(squares: Floats2, products: Floats, solution: Floats, scratch: Floats
 
 
 def _choose(learner: Learner, before: Ints, target: Floats, radius: float, chosen: Ints) -> None:
-    """Choose the cheapest displacement near ``wanted``, given the expected one."""
+    """Choose the cheapest displacement near ``target``, given the expected one."""
     best = -1.0
     for place in range(54):
         odd = place // 27

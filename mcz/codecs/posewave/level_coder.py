@@ -230,6 +230,6 @@ class Metric:
         return result
 
     def from_metric(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
-        """The inverse of ``into``."""
+        """The inverse of ``to_metric``."""
         result: Floats = metric_kernels.out_of_metric(self.plan, factors, rows, which)
         return result

@@ -208,7 +208,7 @@ def _subtract_both(
     shares_2: Floats2,
     lanes: int,
 ) -> None:
-    """``_subtract`` of ``one``, then of ``other``."""
+    """``_subtract`` of ``own`` with its shares, then of ``own_2``."""
     for k in range(i + 1):
         for p in range(lanes):
             left = entries[top + k, p] - shares[i, p] * own[k, p]

@@ -55,7 +55,7 @@ class Model(NamedTuple):
     prediction across channels, ``taps`` (2 levels, 5) and ``tap_energy`` that in time;
     ``level_weights`` (levels, 16) and ``own_weights`` (16, wide) predict magnitudes. ``paths`` (2,
     states, ``N_PATH``) are those before and after a channel, ``ways`` (n, states, 3) lead to them
-    in an encoder. The others are tables and room to work in.
+    in an encoder. The others are tables and scratch space.
     """
 
     coder: Ints

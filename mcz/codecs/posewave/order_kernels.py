@@ -33,7 +33,7 @@ LATE = 0.75  # of a turn: so far from the source an encoder tells a turn
 
 @kernel
 def reorder_axes(angles: Floats2, old_order: Ints, order: Ints, rule: Rule) -> None:
-    """Convert angles from sequence ``given`` to ``wanted``, in place: the first solution."""
+    """Convert angles from ``old_order`` to ``order`` in place: the first solution."""
     m = np.empty(9)
     i, j, k = order[0], order[1], order[2]
     e = 1.0 if (j - i + 3) % 3 == 1 else -1.0

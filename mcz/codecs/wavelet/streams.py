@@ -209,7 +209,7 @@ def build_streams(bands: Sequence[Ints], step: int, coding: Coding) -> list[byte
 def parse_streams(
     stream: Callable[[int], bytes], counts: Sequence[int], limits: Sequence[int], coding: Coding
 ) -> tuple[list[Ints], int]:
-    """The first ``decoded_counts`` of ``counts`` coefficients of every band, and the step code.
+    """The first ``limits`` of ``counts`` coefficients of every band, and the step code.
 
     Raises FormatError on bad bytes.
     """

@@ -6,10 +6,9 @@ encoder chooses a ``Plan``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from construct import Float64l, If, Int8ul, this
@@ -123,7 +122,6 @@ def encode(source: SignalSource, plan: Plan) -> Encoded:
 
     Raises MotionError for a value that is not finite.
     """
-    scaled = plan.quantizer.decimals is None
     inline = plan.transform.wavelet_id == INLINE
     decimals = plan.quantizer.decimals
     fields = WaveletHeader(
@@ -133,7 +131,7 @@ def encode(source: SignalSource, plan: Plan) -> Encoded:
         levels=plan.levels,
         coded_frames=source.layout.n_frames,
         decimals=SCALED if decimals is None else decimals,
-        unit=plan.quantizer.unit if scaled else None,
+        unit=plan.quantizer.unit if decimals is None else None,
         least=plan.quantizer.least,
     )
     header = build(fields, f"{plan.name} header")
@@ -164,9 +162,11 @@ def segment_streams(frames: Frames, plan: Plan, first: int, stop: int) -> tuple[
     bands = frames.coefficients(first, stop)
     if plan.kept is not None:
         levels = [plan.levels, *range(plan.levels, 0, -1)]
-        owns = [wavelets.own_range(first, stop, level, frames.lengths) for level in levels]
-        masks = [kept[own[0] : own[1]] for kept, own in zip(plan.kept, owns, strict=True)]
-        bands = [np.where(mask, band, 0.0) for mask, band in zip(masks, bands, strict=True)]
+        ranges = [wavelets.own_range(first, stop, level, frames.lengths) for level in levels]
+        bands = [
+            np.where(kept[start:end], band, 0.0)
+            for kept, (start, end), band in zip(plan.kept, ranges, bands, strict=True)
+        ]
     by_channel = []
     for channel in range(bands[0].shape[1]):
         indices = [
@@ -190,6 +190,8 @@ def decode(
 
 
 class _Decoder:
+    """A checked header and the segments of a signal."""
+
     def __init__(self, header: bytes, layout: Layout, spans: Sequence[Span]) -> None:
         fields = parse(WaveletHeader, header, f"{NAME} header")  # CODEC-05
         self.fields, self.layout, self.spans = fields, layout, spans
@@ -238,25 +240,31 @@ class _Decoder:
         bands = [np.zeros((stop - start, len(request.groups))) for start, stop in band_ranges]
         end = band_ranges[0][0]
         # Frames of the requested coefficients; the last segment has those beyond the end too.
-        scales = [self._level(band) for band in range(n_bands)]
-        low = min(need[0] << level for need, level in zip(band_ranges, scales, strict=True))
-        high = max(need[1] << level for need, level in zip(band_ranges, scales, strict=True))
+        levels_of_bands = [self._level(band) for band in range(n_bands)]
+        low = min(
+            needed[0] << level for needed, level in zip(band_ranges, levels_of_bands, strict=True)
+        )
+        high = max(
+            needed[1] << level for needed, level in zip(band_ranges, levels_of_bands, strict=True)
+        )
         for index, span in enumerate(self.spans):
             if span.first >= high or (span.stop <= low and span.stop != self.lengths[0]):
                 continue
-            owns = [
+            stored = [
                 wavelets.own_range(span.first, span.stop, self._level(band), self.lengths)
                 for band in range(n_bands)
             ]
-            pairs = zip(owns, band_ranges, strict=True)
-            if all(own[1] <= need[0] or need[1] <= own[0] for own, need in pairs):
+            pairs = zip(stored, band_ranges, strict=True)
+            if all(
+                stored_range[1] <= needed[0] or needed[1] <= stored_range[0]
+                for stored_range, needed in pairs
+            ):
                 continue
-            if owns[0][0] > end:
+            if stored[0][0] > end:
                 break
-            end = owns[0][1]
+            end = stored[0][1]
             for column, group in enumerate(request.groups):
-                stream = partial(_stream, fetch, index, group)
-                self._fill(bands, column, owns, band_ranges, stream)
+                self._fill(bands, column, stored, band_ranges, partial(fetch, index), group)
         if end < band_ranges[0][1]:  # MRDWT-18
             raise FormatError(
                 f"{NAME}: frames {request.start}:{request.stop} need approximations up to "
@@ -276,20 +284,23 @@ class _Decoder:
         self,
         bands: list[Floats],
         column: int,
-        owns: list[tuple[int, int]],
+        stored: list[tuple[int, int]],
         band_ranges: list[tuple[int, int]],
-        stream: Any,
+        fetch: Callable[[int, int], bytes],
+        group: int,
     ) -> None:
-        counts = [stop - start for start, stop in owns]
+        counts = [stop - start for start, stop in stored]
         prefix = [
-            min(max(need[1] - own[0], 0), own[1] - own[0])
-            for own, need in zip(owns, band_ranges, strict=True)
+            min(max(needed[1] - stored_range[0], 0), stored_range[1] - stored_range[0])
+            for stored_range, needed in zip(stored, band_ranges, strict=True)
         ]
-        indices, code = parse_streams(stream, counts, prefix, self.coding)
-        for band, (own, need, source) in enumerate(zip(owns, band_ranges, indices, strict=True)):
-            start = max(own[0], need[0])
-            values = self._values(source[start - own[0] :], code, detail=band > 0)
-            bands[band][start - need[0] : start - need[0] + len(values), column] = values
+        indices, code = parse_streams(lambda band: fetch(band, group), counts, prefix, self.coding)
+        for band, (stored_range, needed, source) in enumerate(
+            zip(stored, band_ranges, indices, strict=True)
+        ):
+            start = max(stored_range[0], needed[0])
+            values = self._values(source[start - stored_range[0] :], code, detail=band > 0)
+            bands[band][start - needed[0] : start - needed[0] + len(values), column] = values
 
     def _values(self, indices: Ints, code: int, *, detail: bool) -> Floats:
         values = indices.astype(np.float64)
@@ -298,10 +309,6 @@ class _Decoder:
         if detail:
             values = np.where(indices == 0, 0.0, values - np.copysign(INWARD, values))
         return np.asarray(values * ((self.fields.unit or 1.0) * ratio_of(code)))  # MRDWT-33
-
-
-def _stream(fetch: Fetch, segment: int, group: int, band: int) -> bytes:
-    return fetch(segment, band, group)
 
 
 def cut(header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[int]) -> bytes:
@@ -347,6 +354,6 @@ class Frames:
         """Advance to the segment that begins at ``stop``."""
         unit = 1 << self.levels
         n_kept = -(-self.wavelet.lead(self.levels) // unit) * unit
-        all_ = np.concatenate([self.history, self.block[: stop - first]])
-        self.history = all_[max(0, len(all_) - n_kept) :]
+        frames = np.concatenate([self.history, self.block[: stop - first]])
+        self.history = frames[max(0, len(frames) - n_kept) :]
         self.block = self.block[stop - first :]

@@ -32,7 +32,7 @@ class Fit:
     """Distances of a solution's points from their target positions.
 
     Distances in length units of the skeleton, over points with a known position, None without any;
-    ``marker_`` ones are of virtual markers. ``max_error`` is in ``frame`` (from 0) at ``point``.
+    ``marker_...`` ones are of virtual markers. ``max_error`` is in ``frame`` (from 0) at ``point``.
     ``unsolved`` names the channels that no position determines; they are 0.
     """
 

@@ -212,7 +212,7 @@ def reorder_clips(
         raise OptionError("no order given: name clips, or give a key to sort by")
     with rewriting(target, output, force=force, progress=progress) as job:
         file = job.file
-        rest = list(file) if by is None else in_order(file, list(file), by)
+        rest = list(file) if by is None else sort_clips(file, list(file), by)
         clips = dict.fromkeys((CLIP, clip.name) for clip in (*file.clips_called(names), *rest))
         plan = plan_whole(file)
         plan.changes = dict.fromkeys([*clips, *plan.changes], UNCHANGED)
@@ -220,7 +220,7 @@ def reorder_clips(
         return job.write(plan, report)
 
 
-def in_order(file: File, clips: Sequence[Clip], by: str) -> list[Clip]:
+def sort_clips(file: File, clips: Sequence[Clip], by: str) -> list[Clip]:
     """``clips`` sorted by a field or metadata key, "-" before it: descending; those without last.
 
     Raises OptionError for an unknown name.

@@ -82,12 +82,12 @@ def uncertain_tokens(tokens: Tokens, kind: GridKind, digits: int, printed: Bools
     A normal number of 15 digits (6 in binary32) is its own shortest text.
     """
     power, shape = tokens.fields[:, 1], tokens.fields[:, 2]
-    digits_kept, far = (6, 30) if kind == GridKind.TEXT32 else (15, 290)
+    safe_digits, safe_power = (6, 30) if kind == GridKind.TEXT32 else (15, 290)
     if digits > _JAVASCRIPT:
         return printed | too_long(tokens)
-    many: Bools = (shape >> kernels.SIGNIFICANT & 31) > digits_kept
-    many |= np.abs(power) > far
-    return (printed & many) | too_long(tokens)
+    is_uncertain: Bools = (shape >> kernels.SIGNIFICANT & 31) > safe_digits
+    is_uncertain |= np.abs(power) > safe_power
+    return (printed & is_uncertain) | too_long(tokens)
 
 
 def too_long(tokens: Tokens) -> Bools:
@@ -211,12 +211,12 @@ def printer(style: int) -> Callable[[float], str]:
 def _short_fixed(x: float, decimals: int) -> str:
     """``%.nf`` as in older C libraries of Windows: zeros after 17 digits."""
     mantissa, _, power = f"{x:.{ROUND_TRIP - 1}e}".partition("e")
-    known = ROUND_TRIP - 1 - int(power)  # decimals of 17 digits
-    if x == 0 or known >= decimals:
+    n_decimals = ROUND_TRIP - 1 - int(power)  # decimals of 17 digits
+    if x == 0 or n_decimals >= decimals:
         return f"{x:.{decimals}f}"
     digits = mantissa.replace(".", "")
-    whole = digits.rjust(known + 1, "0") if known > 0 else digits + "0" * -known
-    point = len(whole) - max(known, 0)
+    whole = digits.rjust(n_decimals + 1, "0") if n_decimals > 0 else digits + "0" * -n_decimals
+    point = len(whole) - max(n_decimals, 0)
     fraction = whole[point:].ljust(decimals, "0")
     return f"{whole[:point]}.{fraction}" if fraction else whole
 
@@ -241,9 +241,11 @@ def printed_texts(digits: int, style: int, flags: int, magnitudes: Ints, negativ
 
 def _restyle(line: str, flags: int) -> str:
     mantissa, e, power = line.partition("e")
-    size = power[1:].lstrip("0") if flags & GridFlag.EXPONENT1 else power[1:]
+    exponent = power[1:].lstrip("0") if flags & GridFlag.EXPONENT1 else power[1:]
     width = 3 if flags & GridFlag.EXPONENT3 else 1
-    return mantissa + ("E" if flags & GridFlag.UPPER else e) + power[:1] + size.rjust(width, "0")
+    return (
+        mantissa + ("E" if flags & GridFlag.UPPER else e) + power[:1] + exponent.rjust(width, "0")
+    )
 
 
 def _general(values: Floats, digits: int, flags: int, negative: Bools) -> Texts:
@@ -259,10 +261,10 @@ def _general(values: Floats, digits: int, flags: int, negative: Bools) -> Texts:
 def printed_shapes(tokens: Tokens, style: int) -> Bools:
     """Mask of the tokens in the shape that the style prints."""
     shape = tokens.fields[:, 2]
-    good: Bools = shape & (kernels.BAD | kernels.SPECIAL) == 0
+    matches: Bools = shape & (kernels.BAD | kernels.SPECIAL) == 0
     if SIGNIFICANT < style < EXPONENT:
-        return good
+        return matches
     decimals = style - EXPONENT if style >= EXPONENT else style % SHORT_FIXED
-    good &= (shape & kernels.EXPONENT != 0) == (style >= EXPONENT)
-    good &= shape >> kernels.FRACTION_DIGITS == decimals
-    return good
+    matches &= (shape & kernels.EXPONENT != 0) == (style >= EXPONENT)
+    matches &= shape >> kernels.FRACTION_DIGITS == decimals
+    return matches

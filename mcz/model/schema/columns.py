@@ -203,9 +203,9 @@ def read_varints(data: np.ndarray, at: int, count: int) -> tuple[Numbers, int]:
         return np.array(few, np.int64), at + end
     if count > len(data) - at:  # CONV-13
         raise TruncatedError(f"{count} varints extend past the end")
-    short = data[at : at + count]
-    if not (short & 0x80).any():
-        return short.astype(np.int64), at + count
+    single = data[at : at + count]
+    if not (single & 0x80).any():
+        return single.astype(np.int64), at + count
     window = data[at : at + MOST_BYTES * count]
     ends = np.flatnonzero(window < 0x80)[:count]
     if len(ends) < count and len(window) < MOST_BYTES * count:
@@ -218,8 +218,8 @@ def read_varints(data: np.ndarray, at: int, count: int) -> tuple[Numbers, int]:
     starts = ends - sizes + 1
     values = (window[starts] & 0x7F).astype(np.int64)
     for index in range(1, int(sizes.max())):
-        has = np.flatnonzero(sizes > index)
-        values[has] |= (window[starts[has] + index] & 0x7F).astype(np.int64) << (7 * index)
+        longer = np.flatnonzero(sizes > index)
+        values[longer] |= (window[starts[longer] + index] & 0x7F).astype(np.int64) << (7 * index)
     if int(values.max()) > MAX_COUNT:  # CONV-01, CONV-03
         raise FormatError("a varint exceeds 2^53 - 1")
     return values, at + int(ends[-1]) + 1
@@ -234,11 +234,11 @@ def build_varints(values: Sequence[int] | Numbers) -> bytes:
         raise FormatError(f"{column.min()} to {column.max()} exceed the range 0 to 2^53 - 1")
     shifts = np.arange(0, 7 * MOST_BYTES, 7)
     parts = column[:, None] >> shifts
-    has = parts > 0
-    has[:, 0] = True
+    is_used = parts > 0
+    is_used[:, 0] = True
     out = (parts & 0x7F).astype(np.uint8)
-    out[:, :-1] |= has[:, 1:].astype(np.uint8) << 7
-    return out[has].tobytes()
+    out[:, :-1] |= is_used[:, 1:].astype(np.uint8) << 7
+    return out[is_used].tobytes()
 
 
 def build_column(kind: construct.Construct, values: Column) -> bytes:

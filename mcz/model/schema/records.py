@@ -85,7 +85,7 @@ class RecordType(construct.Adapter):
         super().__init__(construct.Struct(*(name / item for name, item in self.rows)))
 
     def make_record(self, **values: object) -> Record:
-        """The record of these values; with ``before``, the other fields are missing."""
+        """The record of these values; a partial record lacks its other fields."""
         if self.is_whole:
             return self.record(**values)
         record = object.__new__(self.record)

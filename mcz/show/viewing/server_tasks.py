@@ -42,7 +42,7 @@ MOST_POSTED = 2**30  # bytes of the files of an upload
 MOST_WAITING = 8  # requests that wait for their turn
 MOST_CACHED, CACHED_BYTES = 2, 2**28  # cached motions, and most bytes of one
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
-OWN_BASES = "basis"  # the only parameter that may name a file
+BASIS = "basis"  # the only parameter that may name a file
 
 
 class ServerTasks:
@@ -253,10 +253,10 @@ def dial_of(dial: Dial | None) -> JsonObject | None:
 
 
 def refuse_files(params: Params) -> None:
-    """Raise OptionError for a parameter that names a file of this machine, except our own."""
-    name = params.get(OWN_BASES)
+    """Raise OptionError for a basis in a file of this machine."""
+    name = params.get(BASIS)
     if isinstance(name, str) and not re.fullmatch(r"[a-z0-9_]{1,40}", name):
-        raise OptionError(f"{OWN_BASES}: the page cannot choose files of this machine")
+        raise OptionError(f"{BASIS}: the page cannot choose files of this machine")
 
 
 def glb_writer() -> Callable[..., Any] | None:

@@ -2,7 +2,7 @@
 
 Clip follows clip, and a frame number is missing between two. SPEC.md, "Template of arrays", is
 normative for the way back, and says how a PART divides the rows among the arrays of a file.
-``meaning.py`` decides which array is the motion, ``restore.py`` has the contents of a file.
+``interpretation.py`` decides which array is the motion, ``restore.py`` has the contents of a file.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from mcz.model.types import Ints
 from mcz.sources.arrays.archive import Archive
 from mcz.sources.arrays.columns import Array, columns_of, npy_array, npz_arrays, signal_of
 from mcz.sources.arrays.deflate import is_kept
+from mcz.sources.arrays.interpretation import Interpretation, frames_of, interpret_arrays
 from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Piece, PieceKind, build_arrays
-from mcz.sources.arrays.meaning import Meaning, frames_of, meaning_of
 from mcz.sources.arrays.pickles import Pickle, npy_objects, read_pickle, read_tensors
 from mcz.sources.arrays.restore import Placed, pieces_of, restore_arrays
 
@@ -226,12 +226,12 @@ def _motion(
     library: Library | None = None,
 ) -> Motion:
     if library is None:
-        meaning = meaning_of(arrays)
-        placed = {k: Placed(arrays[k].head, *place) for k, place in meaning.places.items()}
+        interpretation = interpret_arrays(arrays)
+        placed = {k: Placed(arrays[k].head, *place) for k, place in interpretation.places.items()}
     else:
-        meaning = meaning_of(library.arrays)
-        placed = dict(library.placed(arrays, meaning.places))
-    meaning.notes += notes
+        interpretation = interpret_arrays(library.arrays)
+        placed = dict(library.placed(arrays, interpretation.places))
+    interpretation.notes += notes
     pieces = _pieces(arrays, archive, placed)
     n_runs = sum(len(piece.runs) for piece in pieces)
     if len(pieces) > MAX_PIECES or n_runs > MAX_RUNS:
@@ -242,17 +242,17 @@ def _motion(
     template, detail = build_arrays(pieces)
     digest = hashlib.sha256(memoryview(archive.data)[: archive.size]).digest()
     return Motion(
-        meaning.skeleton,
-        tuple(_signals(meaning)),
-        meaning.rate,
-        meaning.rate_is_exact,
+        interpretation.skeleton,
+        tuple(_signals(interpretation)),
+        interpretation.rate,
+        interpretation.rate_is_exact,
         name,
-        _metadata(arrays, archive, meaning, pieces),
+        _metadata(arrays, archive, interpretation, pieces),
         Source(format_name, template, detail, size=archive.size, sha256=digest),
     )
 
 
-def _signals(meaning: Meaning) -> list[Signal]:
+def _signals(interpretation: Interpretation) -> list[Signal]:
     return [
         signal_of(
             [columns_of(words) for words in part.words],
@@ -261,7 +261,7 @@ def _signals(meaning: Meaning) -> list[Signal]:
             part.channels,
             part.role,
         )
-        for part in meaning.parts
+        for part in interpretation.parts
     ]
 
 
@@ -275,7 +275,10 @@ def _pieces(arrays: Sequence[Array], archive: Archive, placed: Mapping[int, Plac
 
 
 def _metadata(
-    arrays: Sequence[Array], archive: Archive, meaning: Meaning, pieces: Sequence[Piece]
+    arrays: Sequence[Array],
+    archive: Archive,
+    interpretation: Interpretation,
+    pieces: Sequence[Piece],
 ) -> dict[str, str]:
     """Metadata of the file: its words, and notes on oddities."""
     notes = [f"{array.name} is {array.kept}" for array in arrays if array.is_loud]
@@ -286,8 +289,8 @@ def _metadata(
     if verbatim:
         size = sum(len(piece.text) for piece in verbatim)
         notes.append(f"{size} bytes of deflate, not zlib's, are kept as they are")
-    notes += meaning.notes
-    return meaning.metadata | ({"source-note": "; ".join(notes)} if notes else {})
+    notes += interpretation.notes
+    return interpretation.metadata | ({"source-note": "; ".join(notes)} if notes else {})
 
 
 def write_arrays(motion: Motion) -> bytes:

@@ -24,8 +24,8 @@ from mcz.model.checks import NUMBERS, PATH, check_arguments
 from mcz.model.motion import Motion, Source
 from mcz.model.types import Items
 from mcz.sources.arrays.columns import MAGIC
+from mcz.sources.arrays.interpretation import SHAPE
 from mcz.sources.arrays.layout import members_of, parse_arrays
-from mcz.sources.arrays.meaning import SHAPE
 from mcz.sources.arrays.skeletons import has_tree, tree
 
 Floats = NDArray[np.float64]

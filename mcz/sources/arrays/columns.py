@@ -182,7 +182,7 @@ BINARY32, BINARY64, INTEGER = (
 )
 NANS = {2: 0x7E00, 4: 0x7FC00000, 8: 0x7FF8000000000000}  # bits of the usual NaN, by bytes
 MOST_DECIMALS = 9  # of a grid for binary64
-LEAST_OF_MANY = 6  # most decimals of a grid preferred to BINARY32
+MOST_PREFERRED = 6  # most decimals of a grid preferred to BINARY32
 LARGEST = 2.0**51  # bound of the magnitudes of decimals
 SAMPLE = 64  # rows tried before a whole column
 
@@ -273,7 +273,7 @@ def _grids_of(values: NDArray[np.float64]) -> tuple[Grid, ...]:
             digits = _decimals(whole, max(digits, 0)) if digits >= 0 else -1
             with np.errstate(over="ignore"):
                 is_narrow = bool((whole.astype(np.float32) == whole).all())
-            if 0 <= digits <= (LEAST_OF_MANY if is_narrow else MOST_DECIMALS):
+            if 0 <= digits <= (MOST_PREFERRED if is_narrow else MOST_DECIMALS):
                 grid = Grid(GridKind.FIXED, digits)
             elif is_narrow:
                 grid = BINARY32
@@ -382,9 +382,11 @@ def _member(data: bytes, member: ArchiveMember) -> Array:
     """The array in a member; ``data`` is that of its archive."""
     name = member.name.removesuffix(".npy")
     if member.contents is None:
-        how = f"deflated, {member.fault}" if member.fault else f"packed by method {member.method}"
-        how = "encrypted" if member.is_encrypted else how
-        return Array(name, NpyHead(), kept=how, is_loud=True)
+        reason = (
+            f"deflated, {member.fault}" if member.fault else f"packed by method {member.method}"
+        )
+        reason = "encrypted" if member.is_encrypted else reason
+        return Array(name, NpyHead(), kept=reason, is_loud=True)
     start, stop = member.contents
     head = read_head(data, start, stop)
     if head.fault:

@@ -19,6 +19,7 @@ from mcz.model.types import JsonObject
 from mcz.sources.arrays.archive import Archive, ArchiveField, read_archive
 from mcz.sources.arrays.columns import MAGIC, MAX_TEXT, Array, NpyHead, array_of, read_head
 from mcz.sources.arrays.columns import is_motion as is_array_motion
+from mcz.sources.arrays.interpretation import LONGEST_TEXT
 from mcz.sources.arrays.layout import (
     INTEGERS,
     LOCAL,
@@ -30,7 +31,6 @@ from mcz.sources.arrays.layout import (
     parse_arrays,
 )
 from mcz.sources.arrays.layout import list_arrays as list_plain
-from mcz.sources.arrays.meaning import LONGEST
 from mcz.sources.arrays.pickle_machine import Machine
 from mcz.sources.arrays.pickle_values import (
     Dict,
@@ -285,7 +285,7 @@ class _Collector:
         words = [text for text in texts if text]
         if len(words) != len(texts) or self.n_facts >= MAX_FACTS:
             return False
-        if max(map(len, words)) > min(LONGEST, MAX_TEXT // 4 // len(words)):
+        if max(map(len, words)) > min(LONGEST_TEXT, MAX_TEXT // 4 // len(words)):
             return False
         self.n_facts += 1
         self._add(_array_of_texts(name, words, (len(words),)))
@@ -298,7 +298,7 @@ class _Collector:
         text = self.machine.text_of(value)
         number = integer_of(value) if not isinstance(value, float) else value
         is_number = isinstance(value, Number | float) or (type(value) is int)
-        if text and len(text) <= LONGEST:
+        if text and len(text) <= LONGEST_TEXT:
             self._add(_array_of_texts(name, [text], ()))
         elif is_number and abs(number) <= 2**53:
             self._add(Array(name, NpyHead(), kept="a single number", words=np.array([[number]])))

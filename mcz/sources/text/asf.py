@@ -303,14 +303,14 @@ def _joints(reader: _Parser) -> tuple[Joint, ...]:
     joints = [Joint("root", -1, reader.position, (), root.axis, root.axis_order, channels)]
     indices = {"root": 0}
     for bone in _parents_first(list(reader.bones.values())):
-        above = indices[bone.parent] if bone.parent is not None else -1
-        offset = joints[above].tails[0] if above > 0 else ORIGIN
+        parent_index = indices[bone.parent] if bone.parent is not None else -1
+        offset = joints[parent_index].tails[0] if parent_index > 0 else ORIGIN
         x, y, z = bone.direction
         tail = (x * bone.length, y * bone.length, z * bone.length)
         channels = tuple(dof_channel(dof) for dof in bone.dofs)
         indices[bone.name] = len(joints)
         joints.append(
-            Joint(bone.name, above, offset, (tail,), bone.axis, bone.axis_order, channels)
+            Joint(bone.name, parent_index, offset, (tail,), bone.axis, bone.axis_order, channels)
         )
     return tuple(joints)
 

@@ -20,7 +20,17 @@ from mcz.codecs.coding.fast import (
     survey_kernels,
     write_kernels,
 )
-from mcz.codecs.coding.fast.decode_kernels import LINK, WEIGHT
+from mcz.codecs.coding.fast.decode_kernels import (
+    BASE,
+    DIGITS,
+    DROP,
+    FIELDS,
+    FORM,
+    LINK,
+    REST,
+    TOP,
+    WEIGHT,
+)
 from mcz.codecs.coding.fast.plan_kernels import TRIED_ROWS, cost_of
 from mcz.codecs.coding.fast.survey_kernels import Channels, CodedLanes
 from mcz.codecs.coding.forms import BINARY32, form_of_grid, has_binary32, unit_grid
@@ -39,40 +49,40 @@ LEAST_GAIN = 60.0  # bits, before a parent is tried
 MOST_WEIGHT = 32000
 
 
-def sample_residuals(residuals: Words2, lane: int, n_seen: int, seen: Floats2) -> None:
-    """Fill a column of ``seen`` with residuals from the whole lane."""
-    step = (residuals.shape[1] - 1) // n_seen
-    for row in range(n_seen):
-        seen[row, lane] = float(int(residuals[lane, 1 + row * step]))
+def sample_residuals(residuals: Words2, lane: int, n_samples: int, samples: Floats2) -> None:
+    """Fill a column of ``samples`` with residuals from the whole lane."""
+    step = (residuals.shape[1] - 1) // n_samples
+    for row in range(n_samples):
+        samples[row, lane] = float(int(residuals[lane, 1 + row * step]))
 
 
-def share_rows(seen: Floats2, lane: int, n_seen: int, shares: Floats) -> float:
+def share_rows(samples: Floats2, lane: int, n_samples: int, shares: Floats) -> float:
     """Fill ``shares`` with weights of rows, less for great residuals; return the energy."""
     size = 0.0
-    for row in range(n_seen):
-        size += abs(seen[row, lane])
-    size = 0.35 * size / n_seen + 0.5
+    for row in range(n_samples):
+        size += abs(samples[row, lane])
+    size = 0.35 * size / n_samples + 0.5
     total = 1e-9
-    for row in range(n_seen):
-        own = seen[row, lane]
+    for row in range(n_samples):
+        own = samples[row, lane]
         shares[row] = 1.0 / (abs(own) + size)
         total += shares[row] * own * own
     return total
 
 
 def add_products(
-    seen: Floats2, lane: int, start: int, shares: Floats, both: Floats, squares: Floats
+    samples: Floats2, lane: int, start: int, shares: Floats, both: Floats, squares: Floats
 ) -> None:
     """Fill ``both`` with a lane's products with lanes from ``start`` on, and ``squares``."""
     stop = start + len(both)
     for other in range(len(both)):
         both[other], squares[other] = 0.0, 1e-9
-    for row in range(0, len(seen), ROWS_AT_ONCE):
-        own1, own2, own3 = seen[row, lane], seen[row + 1, lane], seen[row + 2, lane]
-        own4, share1, share2 = seen[row + 3, lane], shares[row], shares[row + 1]
+    for row in range(0, len(samples), ROWS_AT_ONCE):
+        own1, own2, own3 = samples[row, lane], samples[row + 1, lane], samples[row + 2, lane]
+        own4, share1, share2 = samples[row + 3, lane], shares[row], shares[row + 1]
         share3, share4 = shares[row + 2], shares[row + 3]
-        others1, others2 = seen[row, start:stop], seen[row + 1, start:stop]
-        others3, others4 = seen[row + 2, start:stop], seen[row + 3, start:stop]
+        others1, others2 = samples[row, start:stop], samples[row + 1, start:stop]
+        others3, others4 = samples[row + 2, start:stop], samples[row + 3, start:stop]
         for other in range(len(both)):  # short loops are vectorised
             shared1, shared2 = share1 * others1[other], share2 * others2[other]
             shared3, shared4 = share3 * others3[other], share4 * others4[other]
@@ -91,11 +101,11 @@ def weigh(both: float, square: float, total: float) -> tuple[float, float]:
     return min((2.0 * slope * both - slope * slope * square) / total, 0.999), weight
 
 
-def subtract_parent(own: Words, other: Words, weight: int, tried: Words) -> None:
-    """Fill ``tried`` with a lane's residuals less the prediction from its parent's."""
+def subtract_parent(own: Words, other: Words, weight: int, trial: Words) -> None:
+    """Fill ``trial`` with a lane's residuals less the prediction from its parent's."""
     for row in range(1, len(own)):
         crossed = wrapped(128 + weight * int(other[row])) >> 8
-        tried[row] = wrapped(int(own[row]) - crossed)
+        trial[row] = wrapped(int(own[row]) - crossed)
 
 
 def is_open(others: Ints2, child: int, group: int) -> bool:
@@ -150,16 +160,16 @@ def choose_roots(gains: Floats2, groups: Ints, parents: Ints) -> None:
                 bests[lane], parents[lane] = own, root
 
 
-def find_gains(residuals: Words2, seen: Floats2, n_seen: int, gains: Floats2) -> None:
+def find_gains(residuals: Words2, samples: Floats2, n_samples: int, gains: Floats2) -> None:
     """Fill ``gains``, (lanes, 2 * REACH + 1), with the bits that others would save as parents."""
     n_lanes, n_rows = residuals.shape
-    shares = np.zeros(len(seen), np.float64)
+    shares = np.zeros(len(samples), np.float64)
     both, squares = np.zeros(n_lanes, np.float64), np.zeros(n_lanes, np.float64)
     least = 1.0 - 0.5 ** (2.0 * LEAST_GAIN / n_rows)
     for lane in range(n_lanes):
         start, stop = max(0, lane - REACH), min(n_lanes, lane + REACH + 1)
-        total = share_rows(seen, lane, n_seen, shares)
-        add_products(seen, lane, start, shares, both[: stop - start], squares[: stop - start])
+        total = share_rows(samples, lane, n_samples, shares)
+        add_products(samples, lane, start, shares, both[: stop - start], squares[: stop - start])
         for other in range(start, stop):
             part, _ = weigh(both[other - start], squares[other - start], total)
             if part > least and other != lane:
@@ -175,31 +185,31 @@ def choose_parents(lanes: CodedLanes, plans: Ints2) -> None:
     residuals, numbers, costs = lanes.residuals, lanes.numbers, lanes.costs
     n_lanes, n_rows = residuals.shape
     groups, parents = np.zeros(n_lanes, np.int64), np.zeros(n_lanes, np.int64)
-    n_seen = min(n_rows - 1, SEEN_ROWS)
-    n_blocks = (n_seen + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE
-    seen = np.zeros((ROWS_AT_ONCE * n_blocks, n_lanes), np.float64)  # 0 after n_seen
+    n_samples = min(n_rows - 1, SEEN_ROWS)
+    n_blocks = (n_samples + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE
+    samples = np.zeros((ROWS_AT_ONCE * n_blocks, n_lanes), np.float64)  # 0 after n_seen
     for group in range(len(lanes.starts) - 1):
         for lane in range(lanes.starts[group], lanes.starts[group + 1]):
             groups[lane], parents[lane] = group, -1
-            sample_residuals(residuals, lane, n_seen, seen)
+            sample_residuals(residuals, lane, n_samples, samples)
     gains = np.zeros((n_lanes, 2 * REACH + 1), np.float64)
-    find_gains(residuals, seen, n_seen, gains)
+    find_gains(residuals, samples, n_samples, gains)
     choose_roots(gains, groups, parents)
-    shares, sums = np.zeros(len(seen), np.float64), np.zeros((2, 1), np.float64)
-    tried = np.zeros(n_rows, np.int32)
+    shares, sums = np.zeros(len(samples), np.float64), np.zeros((2, 1), np.float64)
+    trial = np.zeros(n_rows, np.int32)
     times = max(int(n_rows) // TRIED_ROWS, 1)
     for lane in range(n_lanes):
         parent = parents[lane]
         if parent < 0:
             continue
-        total = share_rows(seen, lane, n_seen, shares)
-        add_products(seen, lane, parent, shares, sums[0], sums[1])
+        total = share_rows(samples, lane, n_samples, shares)
+        add_products(samples, lane, parent, shares, sums[0], sums[1])
         _, weight = weigh(sums[0, 0], sums[1, 0], total)
-        subtract_parent(residuals[lane], residuals[parent], int(weight), tried)
-        saved = costs[lane] - cost_of(tried, lanes.scales[lane], costs[lane])
+        subtract_parent(residuals[lane], residuals[parent], int(weight), trial)
+        saved = costs[lane] - cost_of(trial, lanes.scales[lane], costs[lane])
         if saved * times > PARENT_COST:
             plans[numbers[lane], LINK], plans[numbers[lane], WEIGHT] = numbers[parent], int(weight)
-            residuals[lane] = tried
+            residuals[lane] = trial
 
 
 FEWEST_ROWS = 32  # for a search of parents
@@ -271,29 +281,35 @@ class StreamBuilder:
         """The streams of a plan with parents."""
         if len(plan.lanes.numbers) > 1 and len(plan.channels.ordinals) >= FEWEST_ROWS:
             choose_parents(plan.lanes, plan.channels.plans)
-        rooms = np.empty((3, plan.most_bytes), np.uint8)
+        buffers = np.empty((3, plan.most_bytes), np.uint8)
         ends = np.empty(len(self.firsts) - 1, np.int64)
-        write_kernels.write_streams(plan.channels, plan.lanes, plan.fields, rooms, ends)
+        write_kernels.write_streams(plan.channels, plan.lanes, plan.fields, buffers, ends)
         stops = ends.tolist()
         starts = [0, *stops[:-1]]
-        return tuple(rooms[0, a:b].tobytes() for a, b in zip(starts, stops, strict=False))
+        return tuple(buffers[0, a:b].tobytes() for a, b in zip(starts, stops, strict=False))
 
     def _channels(self, ordinals: Ints) -> Channels:
         columns = np.empty((len(self.numbers), len(ordinals)), np.int64)
         plans = np.zeros((len(self.numbers), survey_kernels.PLAN_SIZE), np.int64)
-        numbers, firsts, groups = self.numbers, self.firsts, self.groups
-        forms = self.forms, self.clip_forms
-        given = ordinals, numbers, firsts, groups, *forms
-        result: Channels = survey_kernels.Channels(*given, columns, plans)
+        result: Channels = survey_kernels.Channels(
+            ordinals,
+            self.numbers,
+            self.firsts,
+            self.groups,
+            self.forms,
+            self.clip_forms,
+            columns,
+            plans,
+        )
         return result
 
     def _find_units(self, channels: Channels) -> tuple[dict[int, Ints], bytes]:
         """Code channels in units if possible; returns rests, and the fields of all units."""
         plans = channels.plans
-        tried = self._find_candidates(channels)
+        candidates = self._find_candidates(channels)
         rests: dict[int, Ints] = {}
         fields = b""
-        for n in np.flatnonzero(tried).tolist():
+        for n in np.flatnonzero(candidates).tolist():
             column = np.ascontiguousarray(channels.ordinals[:, self.numbers[n]])
             units = find_units(column, self.grids[n], every=self.grids[n] == self.clip_grids[n])
             if units is None:
@@ -307,24 +323,10 @@ class StreamBuilder:
                 rests[n] = rest
                 quarters = plan_kernels.byte_of(16 * float(np.abs(rest).mean()))
                 rest_scale, own = decode_kernels.scale_of(quarters), own + bytes((quarters,))
-            plans[n, [decode_kernels.FORM, decode_kernels.REST, survey_kernels.LIMIT]] = (
-                units.form,
-                rest_scale,
-                -1,
-            )
-            plans[
-                n,
-                [
-                    decode_kernels.BASE,
-                    decode_kernels.DIGITS,
-                    decode_kernels.DROP,
-                    decode_kernels.TOP,
-                ],
-            ] = 0
-            plans[n, [decode_kernels.FIELDS, survey_kernels.FIELDS_END]] = (
-                len(fields),
-                len(fields) + len(own),
-            )
+            plans[n, [FORM, REST, survey_kernels.LIMIT]] = units.form, rest_scale, -1
+            plans[n, [BASE, DIGITS, DROP, TOP]] = 0
+            end = len(fields) + len(own)
+            plans[n, [FIELDS, survey_kernels.FIELDS_END]] = len(fields), end
             fields += own
         return rests, fields
 
@@ -343,16 +345,14 @@ class StreamBuilder:
         numbers = np.flatnonzero(plans[:, decode_kernels.KIND] == decode_kernels.CODED)
         starts = np.searchsorted(numbers, self.firsts)
         lattices = np.zeros((len(numbers), residual_kernels.LATTICE_SIZE), np.int64)
-        lattices[:, : decode_kernels.SCALE - decode_kernels.BASE] = plans[
-            numbers, decode_kernels.BASE : decode_kernels.SCALE
-        ]
+        lattices[:, : decode_kernels.SCALE - BASE] = plans[numbers, BASE : decode_kernels.SCALE]
         leads, residuals = np.empty((2, len(numbers), len(channels.ordinals)), np.int32)
         costs, scales = np.zeros((2, len(numbers)), np.int64)
         lanes: CodedLanes = survey_kernels.CodedLanes(
             numbers, starts, lattices, leads, residuals, costs, scales
         )
         write_kernels.find_leads(lanes, channels.columns)
-        plans[numbers, decode_kernels.TINY] = lattices[:, decode_kernels.TINY - decode_kernels.BASE]
+        plans[numbers, decode_kernels.TINY] = lattices[:, decode_kernels.TINY - BASE]
         return lanes
 
 

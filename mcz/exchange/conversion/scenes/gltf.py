@@ -108,13 +108,13 @@ class _Document:
         if scene.up_axis in UP_TURNS:
             top["rotation"] = UP_TURNS[scene.up_axis]
         nodes = [top]
-        for node, below in zip(scene.nodes, scene.children, strict=True):
+        for node, children in zip(scene.nodes, scene.children, strict=True):
             entry: JsonObject = {"name": node.name}
             rest = _floats(node.rest)
             if any(rest):
                 entry["translation"] = rest
-            if below:
-                entry["children"] = [number + 1 for number in below]
+            if children:
+                entry["children"] = [number + 1 for number in children]
             if scene.is_markers:
                 entry["mesh"] = self.sides.index(node.side)
                 if not node.is_visible.any():
@@ -178,15 +178,15 @@ class _Document:
         channels: list[JsonObject] = []
         inputs: dict[bytes, int] = {}
 
-        def add(number: int, path: str, keys: Keys, how: str) -> None:
+        def add(number: int, path: str, keys: Keys, interpolation: str) -> None:
             times = self.scene.times[keys.frames].astype("<f4")[:, None]
             key = times.tobytes()
             if key not in inputs:
                 inputs[key] = self._accessor(times, FLOAT, True, view)
             output = self._accessor(keys.values.astype("<f4"), FLOAT, view=view)
             sampler: JsonObject = {"input": inputs[key], "output": output}
-            if how != "LINEAR":
-                sampler["interpolation"] = how
+            if interpolation != "LINEAR":
+                sampler["interpolation"] = interpolation
             target = {"node": number + 1, "path": path}
             channels.append({"sampler": len(samplers), "target": target})
             samplers.append(sampler)

@@ -49,7 +49,7 @@ class ArraySignal:
 
 
 @dataclass
-class Meaning:
+class Interpretation:
     """Signals made of arrays; ``places``: by array, its signal and the channels of its columns."""
 
     skeleton: Skeleton
@@ -65,41 +65,38 @@ class Meaning:
         return any(part.role == "times" for part in self.parts)
 
 
-def meaning_of(arrays: Sequence[Array]) -> Meaning:
+def interpret_arrays(arrays: Sequence[Array]) -> Interpretation:
     """Interpret the arrays of a clip; raises SourceError if none of them is a motion."""
     body = find_body(arrays)
     n_frames = body.n_frames if body is not None else frames_of(arrays)
-    rate, exact, odd = rate_of(arrays, n_frames)
+    rate, exact, notes = rate_of(arrays, n_frames)
     skeleton = body.skeleton if body is not None else Skeleton((), angle_unit="")
-    meaning = Meaning(skeleton, rate, exact, facts_of(arrays), notes=odd)
+    result = Interpretation(skeleton, rate, exact, facts_of(arrays), notes=notes)
     if body is not None:
-        _add_body(meaning, body)
+        result.parts.append(ArraySignal("motion", body.words, role="motion"))
+        result.places |= {index: (0, columns) for index, columns in body.places.items()}
     else:
-        _add_motion(meaning, arrays, n_frames)
+        _add_motion(result, arrays, n_frames)
     for index, array in enumerate(arrays):
-        if index in meaning.places or array.kept or array.name == SHAPE:
+        if index in result.places or array.kept or array.name == SHAPE:
             continue
         per_frame, rest = divmod(len(array.numbers), n_frames)
         if rest or per_frame > (1 if n_frames < 2 else MAX_PER_FRAME) or not per_frame:
             if array.is_large:
                 shape = "x".join(map(str, array.head.shape))
-                meaning.notes.append(f"{array.name} has {shape} numbers, and is kept as its bytes")
+                result.notes.append(f"{array.name} has {shape} numbers, and is kept as its bytes")
             continue
-        place = len(meaning.parts), range(array.numbers.shape[1])
-        meaning.places[index] = place
+        place = len(result.parts), range(array.numbers.shape[1])
+        result.places[index] = place
         channels, role = _channels(array, arrays), ""
-        if per_frame == 1 and channels[0].unit == "s" and not meaning.has_times:
-            fault = times_fault(array.numbers[:, 0].astype(np.float64))
-            role = "" if fault else "times"
-            meaning.notes += [f"the times do not count: {fault}"] if fault else []
+        if per_frame == 1 and channels[0].unit == "s" and not result.has_times:
+            if fault := times_fault(array.numbers[:, 0].astype(np.float64)):
+                result.notes.append(f"the times do not count: {fault}")
+            else:
+                role = "times"
         part = ArraySignal(array.name, [array.numbers], per_frame, channels, role)
-        meaning.parts.append(part)
-    return meaning
-
-
-def _add_body(meaning: Meaning, body: ArrayBody) -> None:
-    meaning.parts.append(ArraySignal("motion", body.words, role="motion"))
-    meaning.places |= {index: (0, columns) for index, columns in body.places.items()}
+        result.parts.append(part)
+    return result
 
 
 def frames_of(arrays: Sequence[Array]) -> int:
@@ -125,31 +122,37 @@ def _reasons(arrays: Sequence[Array]) -> list[str]:
     return [*reasons, "..."] if len(arrays) > len(listed) else reasons
 
 
-def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> None:
+def _add_motion(result: Interpretation, arrays: Sequence[Array], n_frames: int) -> None:
     """Add the motion: the joint angles of a robot, else the first array with the most axes."""
-    fit = [
-        (is_robot(array), min(len(array.head.shape), 3), -index)
+    candidates = [
+        (index, array)
         for index, array in enumerate(arrays)
         if not array.kept and array.n_rows == n_frames and array.name not in TIMES
     ]
-    if not fit:
+    if not candidates:
         raise SourceError("; ".join((f"no array of {n_frames} frames", *_reasons(arrays))))
-    index = -max(fit)[2]
-    array = arrays[index]
-    meaning.parts.append(ArraySignal("motion", [array.numbers], role="motion"))
-    meaning.places[index] = 0, range(array.numbers.shape[1])
+    index, array = max(candidates, key=lambda item: (is_robot(item[1]), _n_axes(item[1])))
+    result.parts.append(ArraySignal("motion", [array.numbers], role="motion"))
+    result.places[index] = 0, range(array.numbers.shape[1])
     joints = plain_joints(array.head.shape[1:], array.name)
     if is_robot(array):
         channel = Channel("", "value", JOINTS[array.name])
         names, robot, note = joint_names(arrays, len(joints))
         names = names or tuple(joint.name for joint in joints)
         joints = tuple(Joint(name, channels=(channel,)) for name in names)
-        meaning.metadata |= {"x-robot": robot} if robot else {}
-        meaning.notes += [note] if note else []
+        if robot:
+            result.metadata["x-robot"] = robot
+        if note:
+            result.notes.append(note)
     elif len(names := names_of(arrays, JOINT_NAMES)) == len(joints) and len(array.head.shape) > 2:
         pairs = zip(joints, names, strict=True)
         joints = tuple(replace(joint, name=name) for joint, name in pairs)
-    meaning.skeleton = Skeleton(joints, angle_unit="")
+    result.skeleton = Skeleton(joints, angle_unit="")
+
+
+def _n_axes(array: Array) -> int:
+    """Axes of an array; more than three count as three."""
+    return min(len(array.head.shape), 3)
 
 
 def plain_joints(inner: Sequence[int], name: str) -> tuple[Joint, ...]:
@@ -186,7 +189,7 @@ def _channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...]:
 TIMES = ("time", "times", "timestamp", "timestamps")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
 SHAPE = "betas"  # shape parameters of a body: only their number is metadata
-LONGEST = 200  # characters of a text that becomes metadata
+LONGEST_TEXT = 200  # characters of a text that becomes metadata
 EVEN = 1e-6  # of a step: deviation of times that count as uniform
 _KEY = re.compile(r"[a-z0-9]+")
 
@@ -206,11 +209,15 @@ def rate_of(arrays: Sequence[Array], n_frames: int) -> tuple[Fraction | None, bo
         if np.isfinite(times).all():
             half = float(np.spacing(np.abs(array.numbers).max())) / 2
             half = max(half, EVEN * abs(float(np.median(np.diff(times)))) / 2)
-        own, own_exact = rate_of_times(times, [half], () if rate is None else (rate,))
-        if own is None:
+        times_rate, is_exact = rate_of_times(times, [half], () if rate is None else (rate,))
+        if times_rate is None:
             return None, True, ["the times are not uniform"]
-        odd = [] if rate in (None, own) else [f"{float(own):g} frames a second by {array.name}"]
-        return own, own_exact, odd
+        notes = (
+            []
+            if rate in (None, times_rate)
+            else [f"{float(times_rate):g} frames a second by {array.name}"]
+        )
+        return times_rate, is_exact, notes
     return rate, exact, []
 
 
@@ -254,12 +261,12 @@ def _text(array: Array) -> str | None:
         return str(array.words.ravel()[0].item())
     if array.head.code[:1] not in ("U", "S") or np.prod(array.head.shape, dtype=np.float64) != 1:
         return None
-    text = decode_text(array.text[: 4 * LONGEST], array)
-    return text if text and len(text) <= LONGEST else None
+    text = decode_text(array.text[: 4 * LONGEST_TEXT], array)
+    return text if text and len(text) <= LONGEST_TEXT else None
 
 
 WHOLE = ("poses", "fullpose", "full_pose")  # all joints
-PLACES = ("trans", "transl")  # position of the root
+ROOT_POSITIONS = ("trans", "transl")  # position of the root
 ROOT, BODY = ("root_orient", "global_orient"), ("pose_body", "body_pose")
 FACE = (("pose_jaw", "jaw_pose"), ("pose_eye",), ("leye_pose",), ("reye_pose",))
 HANDS = (("pose_hand",), ("left_hand_pose",), ("right_hand_pose",))
@@ -268,10 +275,8 @@ BODY_SIZES = {63: "smplh", 69: "smpl"}  # numbers of a body without its root, an
 WITHOUT_HANDS = 22  # joints that SMPL-H and SMPL-X share
 POSITION = 3  # channels of the root before its rotation
 WITH_FACE = 165  # numbers of SMPL-X
-PARTS = {
-    **dict.fromkeys(ROOT, 0),
-    **dict.fromkeys(BODY, 3),
-}  # first number of each part in a whole pose
+# First number of parts in a whole pose.
+PARTS = {**dict.fromkeys(ROOT, 0), **dict.fromkeys(BODY, 3)}
 FACES = {"pose_jaw": 66, "jaw_pose": 66, "pose_eye": 69, "leye_pose": 69, "reye_pose": 72}
 
 
@@ -287,35 +292,35 @@ class ArrayBody:
 
 def find_body(arrays: Sequence[Array]) -> ArrayBody | None:
     """The body whose pose the arrays hold; None if they hold no pose."""
-    named = {
+    indices = {
         array.name: index
         for index, array in reversed([*enumerate(arrays)])
         if not array.kept and array.head.code.startswith("f")
     }
-    whole = next((named[name] for name in WHOLE if name in named), None)
-    turns = [whole] if whole is not None else _pose_parts(arrays, named)
-    model = _model(sum(arrays[k].numbers.shape[1] for k in turns)) if turns else None
+    whole = _first_of(WHOLE, indices)
+    poses = [whole] if whole is not None else _pose_parts(arrays, indices)
+    model = _model(sum(arrays[k].numbers.shape[1] for k in poses)) if poses else None
     if model is None:
         return None
-    n_frames = arrays[turns[0]].n_rows
-    if any(arrays[k].n_rows != n_frames for k in turns):
+    n_frames = arrays[poses[0]].n_rows
+    if any(arrays[k].n_rows != n_frames for k in poses):
         return None
-    places = [named[name] for name in PLACES if name in named]
+    places = [indices[name] for name in ROOT_POSITIONS if name in indices]
     root = [k for k in places if arrays[k].numbers.shape == (n_frames, POSITION)][:1]
-    repeats: dict[int, Sequence[int]] = {}
+    columns: dict[int, Sequence[int]] = {}
     at = 0
-    for index in (*root, *turns):
-        repeats[index] = range(at, at + arrays[index].numbers.shape[1])
-        at += len(repeats[index])
+    for index in (*root, *poses):
+        columns[index] = range(at, at + arrays[index].numbers.shape[1])
+        at += len(columns[index])
     if whole is not None:
-        repeats |= dict(_repeated_parts(arrays, named, whole, POSITION * len(root)))
+        columns |= dict(_repeated_parts(arrays, indices, whole, POSITION * len(root)))
     skeleton = skeleton_of(model, moves=bool(root))
-    return ArrayBody(skeleton, n_frames, [arrays[k].numbers for k in (*root, *turns)], repeats)
+    return ArrayBody(skeleton, n_frames, [arrays[k].numbers for k in (*root, *poses)], columns)
 
 
-def _pose_parts(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:
+def _pose_parts(arrays: Sequence[Array], indices: Mapping[str, int]) -> list[int]:
     """The arrays that together are the joints of a model, in order; [] if there are none."""
-    root, body = (next((named[n] for n in names if n in named), None) for names in (ROOT, BODY))
+    root, body = _first_of(ROOT, indices), _first_of(BODY, indices)
     if root is None or body is None or arrays[root].numbers.shape[1] != 3:
         return []
     if arrays[body].numbers.shape[1] not in BODY_SIZES:
@@ -324,11 +329,15 @@ def _pose_parts(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:
     if BODY_SIZES[arrays[body].numbers.shape[1]] == "smpl":
         return joined
     for group, size in ((FACE, FACE_SIZE), (HANDS, HANDS_SIZE)):
-        parts = [k for names in group for k in (next((named[n] for n in names if n in named), -1),)]
-        parts = [k for k in parts if k >= 0]
+        parts = [k for names in group if (k := _first_of(names, indices)) is not None]
         if sum(arrays[k].numbers.shape[1] for k in parts) == size:
             joined += parts
     return joined
+
+
+def _first_of(names: Sequence[str], indices: Mapping[str, int]) -> int | None:
+    """Index of the first array with one of ``names``, None if there is none."""
+    return next((indices[name] for name in names if name in indices), None)
 
 
 def _model(n_numbers: int) -> BodyTree | None:
@@ -346,17 +355,18 @@ def _model(n_numbers: int) -> BodyTree | None:
 
 
 def _repeated_parts(
-    arrays: Sequence[Array], named: Mapping[str, int], whole: int, first: int
+    arrays: Sequence[Array], indices: Mapping[str, int], whole: int, first: int
 ) -> Iterator[tuple[int, Sequence[int]]]:
     """Arrays that repeat columns of ``whole``, whose channels begin with ``first``."""
     words = arrays[whole].numbers
-    starts = PARTS | dict.fromkeys(("pose_hand", "left_hand_pose"), 66)
-    starts["right_hand_pose"] = 66 + HANDS_SIZE // 2
-    if words.shape[1] == WITH_FACE:
-        hands = [name for names in HANDS for name in names]
-        starts = {n: at + FACE_SIZE * (n in hands) for n, at in starts.items()} | FACES
+    has_face = words.shape[1] == WITH_FACE
+    hands = 66 + FACE_SIZE if has_face else 66
+    starts = PARTS | dict.fromkeys(("pose_hand", "left_hand_pose"), hands)
+    starts["right_hand_pose"] = hands + HANDS_SIZE // 2
+    if has_face:
+        starts |= FACES
     for name, at in starts.items():
-        index = named.get(name)
+        index = indices.get(name)
         if index is None:
             continue
         part = arrays[index].numbers
