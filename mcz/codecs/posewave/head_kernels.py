@@ -33,10 +33,10 @@ def code_head(
         before = code_adaptive(state, data, kept[c], first + C_KEPT + 2 * classes[c] + before)
         kept[c] = before  # PWAVE-18
         own = 2 * classes[c] + before
-        code_bits = code_number(state, data, first, own, numbers[c])
-        if abs(code_bits) >= 1 << MAX_LENGTH:
+        number = code_number(state, data, first, own, numbers[c])
+        if abs(number) >= 1 << MAX_LENGTH:
             return 1
-        numbers[c] = code_bits
+        numbers[c] = number
     return 0
 
 

@@ -33,9 +33,9 @@ SAME, LONGER, N_FLAGS = 4, 5, 15  # contexts behind the first of FLAGS
 UNEXAMINED = 2**16  # bytes, more than any crafted unit has
 
 
-def usual(code_bits: int, kind: int) -> int:
+def usual(number: int, kind: int) -> int:
     """Half the step in LTRs, and one that changes now and then in others."""
-    return ONE - 8 if kind else ONE + (code_bits // 7) % 3
+    return ONE - 8 if kind else ONE + (number // 7) % 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,10 +152,10 @@ class Coding:
             kind = STR
         return self.data[: mixing.finish(self.state, self.data)].tobytes()
 
-    def code_adaptive(self, bit: bool, context: int) -> bool:
+    def adaptive(self, bit: bool, context: int) -> bool:
         return bool(_adaptive(self.state, self.data, int(bit), context))
 
-    def code_bits(self, value: int, n: int) -> None:
+    def number(self, value: int, n: int) -> None:
         _number(self.state, self.data, value % 2**n, n)
 
     def frame(self, kind: int, row: Sequence[int], step: int, *, here: bool) -> None:
@@ -181,8 +181,8 @@ class Coding:
             self.number(change, n - 1)
 
     def coefficients(self, kind: int, row: Sequence[int]) -> None:
-        code_bit = self._golomb if self.plan.coder == GOLOMB else self._code_mixed
-        code_bit(kind, list(row))
+        code = self._golomb if self.plan.coder == GOLOMB else self._code_mixed
+        code(kind, list(row))
 
     def length_of(self, row: Sequence[int]) -> int:
         """Number of coded coefficients of a matrix row: up to the last that is not 0."""
