@@ -51,7 +51,7 @@ async function wholeOrSalvaged({ engine, salvage }, fileId, index) {
   }
 }
 
-const damageText = (store, clip) => `${nameOf(store, clip)} is damaged: ${lostText(clip)}. What is whole is shown.`;
+const damageText = (store, clip) => `${nameOf(store, clip)} is damaged: ${lostText(clip)}. Its intact parts are shown.`;
 
 /** What is wrong with the first file that is opened stays. */
 function messageThatStays(store) {

@@ -93,7 +93,7 @@ test("files of suffixes that the server says are sent to it", async (t) => {
   page.engine.open = async (where, { name }) => ({ id: 1, name, nClips: 0, damage: [], where });
   const files = ["a.trc", "b.xyz"].map((name) => new File(["x"], name));
   await openAll(page, files);
-  assert.match(page.store.get("message").text, /Nothing there .*\.amc with its \.asf, \.c3d$/);
+  assert.match(page.store.get("message").text, /No motion file there.*\.amc with its \.asf, \.c3d$/);
   page.store.set({ server: { canConvert: true, suffixes: [".trc"] } });
   await openAll(page, files);
   assert.deepEqual(sent, [["http://localhost/convert", "POST", "a.trc"]]);

@@ -86,7 +86,7 @@ async function openedStrictlyOrNot(page, where, options) {
     } catch {
       throw error; // what is wrong, not what could not be saved
     }
-    tell(page.store, `${name} is damaged: ${error.message}. What is whole is shown.`, true);
+    tell(page.store, `${name} is damaged: ${error.message}. Its intact parts are shown.`, true);
     return opened;
   }
 }
@@ -113,7 +113,7 @@ async function salvage(page, id, fault) {
       if (store.get(key) === clip) store.set({ [key]: anew, errors: null });
     }
     const lost = store.get("shown")?.fileId === opened.id ? lostText(store.get("shown")) : "";
-    tell(page.store, `${file.name} is damaged: ${lost || fault.message}. What is whole is shown.`, true);
+    tell(page.store, `${file.name} is damaged: ${lost || fault.message}. Its intact parts are shown.`, true);
     return opened.id;
   } catch {
     tell(page.store, `${file.name}: ${faultText(fault)}`, true);
@@ -129,7 +129,7 @@ async function salvage(page, id, fault) {
 export async function openAll(page, files, folders) {
   const wanted = gathered(files, { folders, suffixes: suffixesOf(page) });
   if (wanted.length === 0) {
-    tell(page.store, `Nothing there that is a motion file: ${formatsText(page)}`, true);
+    tell(page.store, `No motion file there; the page opens ${formatsText(page)}`, true);
     return;
   }
   const turn = ask();
@@ -207,7 +207,7 @@ function stayAlive(page) {
   alive.addEventListener("end", () => {
     alive.close();
     page.store.set({ server: null });
-    tell(page.store, "The server has ended. What is here can still be looked at.", true);
+    tell(page.store, "The server has ended. Open clips stay usable.", true);
   });
 }
 
@@ -250,7 +250,7 @@ function takeDrops(page) {
     document.body.classList.remove("is-dropping");
     const { files, folders, nLeft } = await droppedFiles(event.dataTransfer);
     await openAll(page, files, folders);
-    const left = `${nLeft} of what was dropped are left out: they cannot be read, or are too many`;
+    const left = `${nLeft} dropped files are left out: unreadable, or too many`;
     if (nLeft > 0) tell(page.store, left, true);
   });
 }

@@ -67,7 +67,7 @@ test("a folder is dropped as people do it, with the folders in it, and a file", 
 test("what is no motion file is told", async () => {
   await drop(fixture("walk.asf"));
   await page.waitForSelector("#message.fault");
-  assert.match(await page.textContent("#message"), /Nothing there that is a motion file/);
+  assert.match(await page.textContent("#message"), /No motion file there/);
 });
 
 const CODECS =

@@ -113,7 +113,7 @@ test("more curves: positions, channels; each can be taken away", async () => {
   await page.waitForFunction(() =>
     [...document.querySelectorAll(".strip canvas")].some((one) => /Position.*x: .* cm/.test(one.ariaLabel)),
   );
-  await page.click("button[aria-label^='Take away: Channels']");
+  await page.click("button[aria-label^='Remove: Channels']");
   await page.locator(".strip.curves", { hasText: "Channels" }).waitFor({ state: "detached" });
 });
 
@@ -188,7 +188,7 @@ test("without a length unit it is said why there are no contacts", async () => {
   await page.waitForFunction(() => /bvh\.mcz/.test(document.title));
   await page.click("button[aria-label='Curves to show']");
   await page.click("#curves-menu >> text=Foot contacts");
-  await marked(page, /no contacts of feet: the length unit is not known/);
+  await marked(page, /no contacts of feet: the length unit is unknown/);
   await page.context().close();
 });
 

@@ -53,8 +53,8 @@ async function found(clip, { from, to, up = null }) {
   const { facts } = clip;
   const feet = feetOf(facts);
   const none = (why) => ({ from, to, why, feet: [] });
-  if (feet.length === 0) return none("no joint is a foot by its name");
-  if (!(facts.unitCm > 0)) return none("the length unit is not known, and slow is meant in cm/s");
+  if (feet.length === 0) return none("no joint is named like a foot");
+  if (!(facts.unitCm > 0)) return none("the length unit is unknown, but contacts are detected by speed in cm/s");
   let range = [0, facts.nFrames];
   if (facts.nFrames * feet.length > MOST) range = [Math.max(0, from), Math.min(facts.nFrames, to)];
   const nFrames = range[1] - range[0];

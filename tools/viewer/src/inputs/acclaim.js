@@ -48,7 +48,7 @@ function vector(words, number) {
   return [0, 1, 2].map((k) => {
     const value = numberOf(words[k] ?? "");
     if (Number.isNaN(value))
-      refuse(number, `${shown(words[k] ?? "")}, where a number was expected`);
+      refuse(number, `expected a number, not ${shown(words[k] ?? "")}`);
     return value;
   });
 }
@@ -190,7 +190,7 @@ function readFrames(text, skeleton) {
     for (let i = 0; i < place.n; i++) {
       const value = numberOf(words[i + 1]);
       if (Number.isNaN(value))
-        refuse(number, `${shown(words[i + 1])}, where a number was expected`);
+        refuse(number, `expected a number, not ${shown(words[i + 1])}`);
       row[place.firstColumn + i] = value;
     }
   }

@@ -133,7 +133,7 @@ class Reader {
     return [0, 1, 2].map(() => {
       const word = this.#next();
       const number = numberOf(word);
-      if (Number.isNaN(number)) this.#refuse(`${shown(word)}, where a number was expected`);
+      if (Number.isNaN(number)) this.#refuse(`expected a number, not ${shown(word)}`);
       return number;
     });
   }
@@ -145,7 +145,7 @@ class Reader {
     return Array.from({ length: Number(word) }, () => {
       const name = this.#next();
       if (name === "" || name === "{" || name === "}")
-        this.#refuse("fewer channels than CHANNELS says");
+        this.#refuse("fewer channels than CHANNELS states");
       const kind = KINDS[name.toLowerCase()] ?? 0;
       return kind === 0 ? { kind, name } : { kind };
     });
@@ -156,7 +156,7 @@ class Reader {
     const head = /\s*Frames:\s*(\S+)\s+Frame\s+Time:\s*(\S+)[^\n]*/iy;
     head.lastIndex = this.#word.lastIndex;
     const match = head.exec(this.#text);
-    if (match === null) this.#refuse("Frames: and Frame Time: are due behind MOTION");
+    if (match === null) this.#refuse("Frames: and Frame Time: must follow MOTION");
     this.#word.lastIndex = head.lastIndex;
     const values = this.#numbers(head.lastIndex);
     const whole = nChannels === 0 ? 0 : Math.floor(values.length / nChannels);
@@ -181,7 +181,7 @@ class Reader {
       const value = valueOf(word);
       if (value === null) {
         this.#word.lastIndex = end;
-        this.#refuse(`${shown(word)}, where a number was expected`);
+        this.#refuse(`expected a number, not ${shown(word)}`);
       }
       if (n === values.length) {
         const grown = new Float64Array(2 * n);

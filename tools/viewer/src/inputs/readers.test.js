@@ -53,11 +53,11 @@ test("a BVH whose last row is not whole has the rows before it", () => {
 
 const FAULTS = [
   ["nonsense", /line 1: no HIERARCHY/],
-  [BVH.replace("OFFSET 1 -2 0", "OFFSET 1 two 0"), /line 8: "two", where a number/],
+  [BVH.replace("OFFSET 1 -2 0", "OFFSET 1 two 0"), /line 8: expected a number, not "two"/],
   [BVH.replace("CHANNELS 3", "CHANNELS many"), /line 9: CHANNELS "many"/],
-  [BVH.replace("8 9\n", "8 <b>\n"), /line 19: "<b>", where a number/],
+  [BVH.replace("8 9\n", "8 <b>\n"), /line 19: expected a number, not "<b>"/],
   [BVH.slice(0, 120), /line \d: /],
-  [BVH.replace("Frame Time", "Time"), /Frame Time: are due/],
+  [BVH.replace("Frame Time", "Time"), /Frame Time: must follow/],
   ["HIERARCHY\nMOTION\n", /line 2: no joint/],
 ];
 

@@ -48,7 +48,7 @@ function mountChooser(section, page) {
     clipField.hidden = !file || file.nClips > MOST_OPTIONS;
     note.textContent =
       file && file.nClips > MOST_OPTIONS ? "Choose it in the list of clips: its button, or Shift C." : "";
-    if (files.value === CODED) note.textContent = "Coded from the clip that is shown.";
+    if (files.value === CODED) note.textContent = "Encoded from the shown clip.";
     if (clipField.hidden) return;
     const rows = await engine.rows(file.id, 0, file.nClips).catch(() => []);
     if (mine !== asked) return;

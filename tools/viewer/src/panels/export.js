@@ -17,7 +17,7 @@ export function mountExport(panel, page) {
     put(section, one);
   };
   const part = (title, note) => make("section", { class: "exports" }, make("h2", {}, title), note && make("p", { class: "quiet" }, note));
-  const picture = part("Picture", "As the stage shows it now.");
+  const picture = part("Picture", "The view as it is now.");
   add(picture, "png", "PNG", async () => save(await stagePicture(page), "png"));
   const film = part("Film", "The whole clip, once, at the chosen speed.");
   add(film, "video", "WebM or MP4", (_, say) => filmed(page, say));
@@ -28,12 +28,12 @@ export function mountExport(panel, page) {
   });
   add(motion, "source", "Source file", async ({ shown }) => {
     const bytes = await page.engine.source(shown);
-    if (!bytes) throw new Error("The clip does not hold the file that it was made of.");
+    if (!bytes) throw new Error("The clip has no source file.");
     const path = typeof shown.source === "string" ? shown.source : shown.source?.path;
     const name = (path ?? "").split(/[\\/]/).pop();
     return { blob: new Blob([bytes]), name: fileName(name || `${shown.name}.bin`) };
   });
-  const numbers = part("Numbers", "The curves below the timeline, a row a frame.");
+  const numbers = part("Numbers", "The curves below the timeline, one row a frame.");
   add(numbers, "csv", "CSV of the curves", async ({ shown }) => {
     const text = await csvOf(page.engine, shown, store.get("curves") ?? [], store.get("errors"));
     return save(new Blob([text], { type: "text/csv" }), "csv");
@@ -67,7 +67,7 @@ async function run(element, act, { store }) {
     const made = await act({ shown }, (text) => (label.textContent = `${textContent}: ${text}`));
     const name = made.name ?? `${fileName(shown.name)}.${made.suffix}`;
     download(made.blob, name);
-    tell(store, `${name} is saved.`);
+    tell(store, `Saved ${name}.`);
   } catch (error) {
     tellError(store, error);
   } finally {

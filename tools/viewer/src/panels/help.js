@@ -18,18 +18,18 @@ const GROUPS = [
   [
     "Curves",
     [
-      ["← →", "a frame back, on"],
+      ["← →", "a frame back, forward"],
       ["+ −", "zoom; with the mouse the wheel, on a touch screen two fingers"],
       ["Shift ← →", "move along"],
       ["0", "all of the clip"],
-      ["Enter", "in errors: go to the greatest one"],
+      ["Enter", "in errors: go to the greatest"],
     ],
   ],
   [
     "Panels",
     [
       ["/", "search clips"],
-      ["B, I, V", "clips, details, curves: shown or not"],
+      ["B, I, V", "show or hide clips, details, curves"],
       ["?", "these keys"],
     ],
   ],

@@ -56,7 +56,7 @@ function clipFacts(clip) {
     ["Name", clip.name || "(no name)"],
     ...aliasFacts(clip.aliases ?? []),
     ["Frames", count(clip.nFrames)],
-    ["Duration", seconds === null ? "not known: no frame rate" : duration(seconds)],
+    ["Duration", seconds === null ? "unknown: no frame rate" : duration(seconds)],
     ["Frame rate", clip.rate ? `${figure(clip.rate, 6)} frames/s` : "none"],
     ["First frame", clip.firstFrame ? count(clip.firstFrame) : null],
     ["Time", timeFacts(clip)],
@@ -93,8 +93,8 @@ function skeletonFacts(clip) {
     ["Joints", clip.joints && count(clip.joints.length)],
     ["Points", isMarkers ? `${counted(n, "marker")}, ${lines}` : `${counted(n, "point")}, ${lines}`],
     ["Channels", Array.isArray(channels) ? count(channels.length) : channels && count(channels)],
-    ["Length unit", unitCm ? `${figure(unitCm)} cm` : "the file does not say"],
-    ["Up", up ?? `the file does not say${guess}`],
+    ["Length unit", unitCm ? `${figure(unitCm)} cm` : "not stated in the file"],
+    ["Up", up ?? `not stated in the file${guess}`],
   ];
 }
 

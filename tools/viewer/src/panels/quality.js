@@ -42,7 +42,7 @@ class Quality {
   #build(panel) {
     const field = (text, ...inputs) => make("div", { class: "field" }, make("label", { for: inputs[0].id }, text), inputs);
     this.unitField = field("One unit is", this.unit);
-    for (const [value, text] of [["", "not known"], ["cm", "1 cm"], ["mm", "1 mm"], ["m", "1 m"], ["in", "1 inch"]]) {
+    for (const [value, text] of [["", "unknown"], ["cm", "1 cm"], ["mm", "1 mm"], ["m", "1 m"], ["in", "1 inch"]]) {
       put(this.unit, make("option", { value }, text));
     }
     this.controls = make(
@@ -53,7 +53,7 @@ class Quality {
       make("div", { class: "field" }, make("label", { for: "quality-slider" }, "Value"), make("div", { class: "dial" }, this.slider, this.number)),
       this.unitField,
       this.meaning,
-      make("div", { class: "buttons" }, button({ shown: "Code it", onClick: () => this.#encode() }), button({ label: "Clear: forget the tries", shown: "Clear", onClick: () => this.#clear() })),
+      make("div", { class: "buttons" }, button({ shown: "Encode", onClick: () => this.#encode() }), button({ label: "Clear the tries", shown: "Clear", onClick: () => this.#clear() })),
     );
     this.note = make("p", { class: "quiet" });
     put(panel, this.note, this.controls, this.plot.element, this.result);
@@ -115,7 +115,7 @@ class Quality {
     this.note.textContent = canEncode
       ? ""
       : clip
-        ? "Only clips of files that mcz view was given can be coded anew."
+        ? "Only clips of files that mcz view serves can be re-encoded."
         : "No clip is shown.";
     this.#abort?.abort();
     this.#waiting = null;
@@ -191,7 +191,7 @@ class Quality {
       facts([
         ["Bytes", make("b", {}, `${size(bytes)}`)],
         ["Rate", clip.rate ? `${figure((8 * bytes) / (clip.nFrames / clip.rate) / 1000, 3)} kbit/s` : null],
-        ["Of what is shown", clip.bytes ? `${figure((100 * bytes) / clip.bytes, 3)} %` : null],
+        ["Of the shown clip", clip.bytes ? `${figure((100 * bytes) / clip.bytes, 3)} %` : null],
         ["Ratio", `${figure(float32 / bytes, 3)} : 1 of float32${typeof ofSource === "number" ? `, ${figure(ofSource / bytes, 3)} : 1 of the source` : ""}`],
         ["Mean error", make("b", {}, distance(errors.total.mean, unitCm))],
         ["Greatest", make("b", {}, distance(errors.total.max, unitCm))],

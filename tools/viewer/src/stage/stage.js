@@ -52,7 +52,7 @@ class Stage {
     } catch {
       canvas.remove();
       this.#fault(
-        "This browser does not draw in three dimensions (no WebGL). Curves and numbers work all the same.",
+        "This browser cannot draw in three dimensions (no WebGL). Curves and numbers still work.",
       );
       return;
     }
@@ -386,7 +386,7 @@ class Stage {
   #follow(places) {
     const { least, most } = this.shown.bounds(places);
     const isEmpty = least[0] > most[0];
-    this.labels.setNote(isEmpty ? "No point is seen in this frame" : this.gridText);
+    this.labels.setNote(isEmpty ? "No point is visible in this frame" : this.gridText);
     if (isEmpty) return;
     const middle = least.map((x, k) => (x + most[k]) / 2);
     this.view.world.goWith(middle[0], middle[2]);
@@ -474,5 +474,5 @@ class Stage {
 
 function whyNoFigure({ nFrames, name }) {
   if (nFrames === 0) return `${name} has no frames.`;
-  return `${name} has no figure: its channels do not say where anything is. Its curves are below.`;
+  return `${name} has no figure, because its channels give no positions. Its curves are below.`;
 }

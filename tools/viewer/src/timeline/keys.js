@@ -11,7 +11,7 @@ export const KEYS = [
   ["← →", "a frame back, on; with Shift ten"],
   ["Home End", "first frame, last frame"],
   ["[ ]", "slower, faster"],
-  ["L", "again from the start at the end"],
+  ["L", "loop: start again at the end"],
   ["F", "figure in the middle"],
   ["1 2 3 4", "from the front, the side, the top, a quarter"],
   ["C", "camera follows"],

@@ -48,7 +48,7 @@ export function mountTimeline(element, page) {
     scrub.max = String(Math.max(0, (shown?.nFrames ?? 1) - 1));
     place.title =
       isThere && !shown.rate
-        ? `The file does not say its rate: ${USUAL_RATE} frames a second are assumed`
+        ? `The file does not state its rate; ${USUAL_RATE} frames a second are assumed`
         : "";
   });
   store.watch(["frame", "shown"], () => showPlace(store, scrub, place));

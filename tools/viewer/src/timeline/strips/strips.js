@@ -137,7 +137,7 @@ class Strips {
     const painter = made();
     const close =
       source &&
-      button({ label: `Take away: ${name}`, icon: "close", class: "small", onClick: () => this.#choose(source, false) });
+      button({ label: `Remove: ${name}`, icon: "close", class: "small", onClick: () => this.#choose(source, false) });
     const className = painter instanceof MarksStrip ? "marks" : "curves";
     const row = new Row(this, { name, className, painter, close });
     painter.row = row;
