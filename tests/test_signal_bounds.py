@@ -249,7 +249,10 @@ def test_bounds_have_units(unit: str, text: str, bound: float) -> None:
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        ({"emg.max_error": "1N"}, "channel biceps is in V, which N does not fit"),
+        (
+            {"emg.max_error": "1N"},
+            "in V, which 1N does not fit; add a bound for it, such as 1N,5",
+        ),
         ({"emg.max_error": "-1"}, "write a number and optionally a unit, such as 0.5mV"),
         ({"emg.max_error": "much"}, "write a number and optionally a unit, such as 0.5mV"),
         ({"emg.mean_error": "1.2.3V"}, "write a number and optionally a unit, such as 0.5mV"),

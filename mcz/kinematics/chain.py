@@ -128,8 +128,8 @@ class Chain:
             )
         if channels and not any(channel.kind for channel in channels):
             raise MotionError(
-                f"skeleton {skeleton.name!r}: all {len(channels)} channels are plain scalars, "
-                "which do not move joints"
+                f"{f'skeleton {skeleton.name!r}: ' if skeleton.name else ''}all {len(channels)} "
+                "channels are plain scalars, which do not move joints"
             )
         self.radians = np.pi / 180 if skeleton.angle_unit == "deg" else 1.0
         self.turned = [orientation(joint, self.radians) for joint in skeleton.joints]

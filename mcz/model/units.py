@@ -79,7 +79,9 @@ def _quantities() -> dict[str, tuple[str, float]]:
     quantities = {"Nm": "moment", "rad": "angle"}
     for base in ("V", "N", "Nm", "W", "Pa", "Hz", "s", "rad"):
         units |= {p + base: (quantities.get(base, base), f) for p, f in prefixes.items()}
-    return units
+    words = {"Volt": "V", "Volts": "V", "Newton": "N", "Newtons": "N", "N-m": "Nm", "N-mm": "Nmm"}
+    units |= {name: units[unit] for word, unit in words.items() for name in (word, word.lower())}
+    return units | {"N-M": units["Nm"]}
 
 
 _QUANTITIES = _quantities()
@@ -90,6 +92,8 @@ def unit_ratio(unit: str, other: str) -> float | None:
 
     >>> unit_ratio("mrad", "rad"), unit_ratio("N.m", "Nmm"), unit_ratio("mV", "N")
     (0.001, 1000.0, None)
+    >>> unit_ratio("mV", "Volts"), unit_ratio("N", "Newtons"), unit_ratio("Nm", "N-M")
+    (0.001, 1.0, 1.0)
     """
     plain_unit, other_unit = (re.sub(r"[\s.*·]", "", text) for text in (unit, other))
     if plain_unit == other_unit:

@@ -49,6 +49,11 @@ def test_one_step_is_two(folder: Path, call: Call, origin: str, to: str) -> None
     assert (folder / f"one{to}").read_bytes() == (folder / f"two{to}").read_bytes()
 
 
+def test_a_unit_that_a_format_needs_is_asked_for(folder: Path, call: Call) -> None:
+    code, _, errors = call("convert", folder / "walk.bvh", folder / "x.trc")
+    assert code == 1 and "TRC needs a length unit of mm, cm or m; set the unit (--unit)" in errors
+
+
 def test_what_is_left_out_is_said(folder: Path, call: Call) -> None:
     code, out, err = call("convert", folder / "walk.c3d", folder / "x.trc")
     size = (folder / "x.trc").stat().st_size

@@ -303,11 +303,10 @@ def limits_of(
         ratios = [(size, _ratio(skeleton, channel, unit) if unit else 1.0) for size, unit in bounds]
         fitting = [size * ratio for size, ratio in ratios if ratio is not None]
         if not fitting:
-            units = " and ".join(unit for _, unit in bounds)
             own = _unit_of(skeleton, channel)
             raise OptionError(
-                f"{key}: channel {channel.label or number} is in {own or 'an unknown unit'}, "
-                f"which {units} does not fit; several bounds may be given, such as 1N,10Nmm,5"
+                f"{key}: channel {channel.label or number} is in {own or 'an unknown unit'}, which "
+                f"{text} does not fit; add a bound for it, such as {text},5 in its own unit"
             )
         limits.append(fitting[0])
     return np.array(limits)

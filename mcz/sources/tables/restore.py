@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError, MotionError
+from mcz.hints import Hint
 from mcz.model.clock import TIMES, TOLERANCE, Timeline, numbers_or_rows
 from mcz.model.motion import POSITION_KINDS, Channel, Exceptions, Motion, Signal, Source
 from mcz.model.numbers import Grid, GridKind
@@ -146,7 +147,7 @@ def plain_trc(motion: Motion) -> Motion:
             raise MotionError(f"TRC holds markers only; joint {joint.name!r} is not a marker")
     unit = UNITS.get(skeleton.unit_cm or 0.0)
     if unit is None:
-        raise MotionError("TRC needs a length unit of mm, cm or m")
+        raise MotionError("TRC needs a length unit of mm, cm or m", hint=Hint.UNIT)
     rate = f"{float(_rate(motion)):.6f}"
     first = int(numbers_or_rows(motion.frame_numbers, motion.n_frames)[0]) if motion.n_frames else 1
     names = _names([joint.name for joint in skeleton.joints], motion.n_frames)
