@@ -6,6 +6,9 @@
 #define MCZ_CORE_H
 #include <stddef.h>
 #include <stdint.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 enum { MCZ_OK = 0, MCZ_INVALID = 1, MCZ_NO_MEMORY = 2, MCZ_UNSUPPORTED = 3, MCZ_NO_SUCH = 4 };
 
@@ -70,4 +73,7 @@ mcz_rows *mcz_rows_open(const mcz *file, size_t clip, size_t signal, uint64_t be
 int mcz_rows_next(mcz_rows *rows, mcz_block *out, mcz_error *error);
 void mcz_rows_check(mcz_rows *rows, int hash); /* 0: do not compare the hash; before the first block */
 void mcz_rows_close(mcz_rows *rows);
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -14,13 +14,27 @@ import { AccessError } from "./errors.js";
  */
 
 /**
- * @param {Uint8Array} bytes of a whole file
+ * The bytes of a file, which `fetch` and Blobs give as an ArrayBuffer.
+ *
+ * @param {Uint8Array | ArrayBuffer} bytes
+ * @returns {Uint8Array}
+ * @throws {TypeError} for anything else
+ */
+export function bytesFrom(bytes) {
+  if (bytes instanceof Uint8Array) return bytes;
+  if (bytes instanceof ArrayBuffer) return new Uint8Array(bytes);
+  throw new TypeError("a file is given as a Uint8Array or an ArrayBuffer");
+}
+
+/**
+ * @param {Uint8Array | ArrayBuffer} bytes of a whole file
  * @returns {Source}
  */
 export function fromBytes(bytes) {
+  const data = bytesFrom(bytes);
   return {
-    size: bytes.length,
-    read: async (start, stop) => bytes.subarray(start, stop),
+    size: data.length,
+    read: async (start, stop) => data.subarray(start, stop),
   };
 }
 

@@ -2,6 +2,7 @@
 
 import { codecLabel } from "./codecs.js";
 import { Refused, Unsupported } from "./errors.js";
+import { bytesFrom } from "./from-bytes.js";
 import { Room, decodedLimit } from "./limits.js";
 import { guarded } from "./memory.js";
 import { canFilter, postFilter } from "./post-filter.js";
@@ -44,7 +45,7 @@ export { analogValues } from "./recording.js";
 /**
  * What the clips of a file are, without decoding them. The container is checked as a whole.
  *
- * @param {Uint8Array} bytes the whole file
+ * @param {Uint8Array | ArrayBuffer} bytes the whole file
  * @param {{decodedLimit?: number}} [options]
  * @returns {{name: string, nFrames: number,
  *   frameRate: {numerator: number, denominator: number},
@@ -56,7 +57,8 @@ export { analogValues } from "./recording.js";
  * @throws {MczError} {@link Refused} or {@link Unsupported}, and nothing else
  */
 export function list(bytes, options = {}) {
-  return guarded(() => Array.from(readFile(bytes, options).clips.values(), factsOf));
+  const data = bytesFrom(bytes);
+  return guarded(() => Array.from(readFile(data, options).clips.values(), factsOf));
 }
 
 function factsOf({ name, nFrames, frameRate, skeleton, metadata, source, quality, signals }) {
@@ -83,15 +85,16 @@ function factsOf({ name, nFrames, frameRate, skeleton, metadata, source, quality
 /**
  * Decodes a file, or the part of it that is asked for. The container is checked as a whole.
  *
- * @param {Uint8Array} bytes the whole file
+ * @param {Uint8Array | ArrayBuffer} bytes the whole file
  * @param {Options} [options]
  * @returns {{name: string, frameRate: {numerator: number, denominator: number},
  *   nFrames: number, signals: SignalArrays[]}[]} the clips in file order
  * @throws {MczError} {@link Refused} or {@link Unsupported}, and nothing else
  */
 export function decode(bytes, options = {}) {
+  const data = bytesFrom(bytes);
   return guarded(() => {
-    const file = readFile(bytes, options);
+    const file = readFile(data, options);
     const room = new Room(limitOf(file, options));
     return each(wantedClips(file, options), (clip) => decodeClip(clip, options, room));
   });
@@ -100,15 +103,16 @@ export function decode(bytes, options = {}) {
 /**
  * Restores the source files that a file holds.
  *
- * @param {Uint8Array} bytes the whole file
+ * @param {Uint8Array | ArrayBuffer} bytes the whole file
  * @param {{decodedLimit?: number}} [options]
  * @returns {{path: string, bytes: Uint8Array}[]} those of clips, then attachments, then aliases,
  *   each in file order
  * @throws {MczError} {@link Refused} or {@link Unsupported}, and nothing else
  */
 export function sources(bytes, options = {}) {
+  const data = bytesFrom(bytes);
   return guarded(() => {
-    const file = readFile(bytes, options);
+    const file = readFile(data, options);
     const room = new Room(limitOf(file, options));
     const contents = new Map(); // of clips and attachments, as far as they could be restored
     const keep = (item, path, content) => {

@@ -367,3 +367,15 @@ test("a list of clips is looked at without making them", async () => {
   assert.equal(file.clips.indexOf("second"), 1);
   assert.equal(file.clips.slice(1)[0].index, 1);
 });
+
+test("a file is an array of bytes or an ArrayBuffer, and nothing else", async () => {
+  const bytes = bytesOf("valid/container/attachments.mcz");
+  const { buffer } = new Uint8Array(bytes);
+  assert.deepEqual(list(buffer), list(bytes));
+  assert.deepEqual(decode(buffer), decode(bytes));
+  assert.deepEqual(sources(buffer), sources(bytes));
+  assert.equal((await open(fromBytes(buffer))).clips.length, list(bytes).length);
+  for (const wrong of [null, "walk.mcz", [1, 2]])
+    for (const read of [list, decode, sources, fromBytes])
+      assert.throws(() => read(wrong), /Uint8Array or an ArrayBuffer/);
+});
