@@ -139,7 +139,7 @@ def test_what_nobody_says_is_guessed_and_said() -> None:
 
 
 def test_what_has_no_contacts_is_refused() -> None:
-    with pytest.raises(OptionError, match="length unit of skeleton .*unit="):
+    with pytest.raises(OptionError, match="length unit of the skeleton is unknown.*unit="):
         contacts(markers("lfoot", np.zeros((9, 1, 3)), unit_cm=None))
     joint = Joint("lfoot", channels=(Channel("rx"),))
     turning = Motion(

@@ -221,6 +221,17 @@ def test_resampled_turns_are_slerps(skeleton: Skeleton, rate: Fraction | int) ->
             np.testing.assert_allclose(after[:, number], wanted, atol=1e-6)
 
 
+def test_quaternions_need_no_angle_unit_to_turn() -> None:
+    """As those of Motive and of arrays, which state none."""
+    joint = mcz.Joint("a", channels=tuple(mcz.Channel(f"q{part}") for part in "xyzw"))
+    turns = Rotation.from_rotvec(np.outer(np.arange(6.0) ** 2, [0.05, 0.02, -0.03]))
+    signal = mcz.Signal(turns.as_quat())
+    motion = mcz.Motion(mcz.Skeleton((joint,), angle_unit=""), (signal,), 100)
+    found = mcz.resample(motion, 250)
+    expected = Slerp(np.arange(6) / 100, turns)(np.arange(found.n_frames) / 250)
+    np.testing.assert_allclose(found.values, expected.as_quat(), atol=1e-12)
+
+
 def test_frames_that_coincide_are_the_same_bits() -> None:
     motion = smooth(41)  # 120 a second
     twice = mcz.resample(motion, 240)

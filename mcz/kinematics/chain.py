@@ -32,6 +32,7 @@ from mcz.model.motion import (
     Skeleton,
 )
 from mcz.model.skeleton import first_columns
+from mcz.model.text_format import named
 from mcz.model.types import Floats as Floats
 
 SCALE_KINDS = ("sx", "sy", "sz")
@@ -110,6 +111,14 @@ class Pose:
     spins: list[list[Floats]]
 
 
+def knows_angles(skeleton: Skeleton) -> bool:
+    """Return whether the rotations of a skeleton have a meaning: quaternions need no angle unit."""
+    if skeleton.angle_unit:
+        return True
+    turning = any(channel.kind in ANGLE_KINDS for channel in skeleton.channels)
+    return not turning and not any(any(joint.axis) for joint in skeleton.joints)
+
+
 class Chain:
     """The kinematics of a skeleton, prepared once for all frames.
 
@@ -120,15 +129,14 @@ class Chain:
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
         channels = skeleton.channels
-        turning = any(c.kind in ANGLE_KINDS for c in channels)
-        if not skeleton.angle_unit and (turning or any(any(j.axis) for j in skeleton.joints)):
+        if not knows_angles(skeleton):
             raise MotionError(
-                f"the angle unit of skeleton {skeleton.name!r} is unknown, so its rotations "
-                "have no meaning"
+                f"the angle unit of {named('skeleton', skeleton.name)} is unknown, so its "
+                "rotations have no meaning"
             )
         if channels and not any(channel.kind for channel in channels):
             raise MotionError(
-                f"{f'skeleton {skeleton.name!r}: ' if skeleton.name else ''}all {len(channels)} "
+                f"{named('skeleton', skeleton.name)}: all {len(channels)} "
                 "channels are plain scalars, which do not move joints"
             )
         self.radians = np.pi / 180 if skeleton.angle_unit == "deg" else 1.0

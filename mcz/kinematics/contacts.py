@@ -19,7 +19,7 @@ from mcz.kinematics.points import first_points, positions_of
 from mcz.model.checks import check_arguments
 from mcz.model.motion import A_MOTION, Motion, Skeleton
 from mcz.model.skeleton import column_of, joint_list, signs_of
-from mcz.model.text_format import count_text, fields_text
+from mcz.model.text_format import count_text, fields_text, named
 from mcz.model.types import Bools, Floats
 
 USUAL_RATE = 120.0  # assumed frames a second: the rate of CMU's AMC files
@@ -146,14 +146,14 @@ class FootTracks:
         )
         if not indices:
             raise MotionError(
-                f"skeleton {skeleton.name!r}: none of its "
+                f"{named('skeleton', skeleton.name)}: none of its "
                 f"{count_text(skeleton.n_joints, 'joint')} is named like a foot",
                 hint=Hint.FEET,
             )
         if skeleton.unit_cm is None:
             raise OptionError(
-                f"the length unit of skeleton {skeleton.name!r} is unknown, but contacts are "
-                "detected by speed in cm/s",
+                f"the length unit of {named('skeleton', skeleton.name)} is unknown, but contacts "
+                "are detected by speed in cm/s",
                 hint=Hint.UNIT,
             )
         addresses, firsts = skeleton.addresses(), first_points(skeleton)

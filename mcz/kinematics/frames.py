@@ -36,6 +36,7 @@ from mcz.model.checks import FRAMES, ArgumentType, check_arguments
 from mcz.model.clock import Timeline, known_timeline
 from mcz.model.motion import Motion, Skeleton, check_poses
 from mcz.model.skeleton import Joints, joint_columns, joint_list
+from mcz.model.text_format import named
 from mcz.model.types import Floats, Reals, Values
 from mcz.model.units import unit_cm_of
 
@@ -352,7 +353,7 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     unit_cm = unit_cm_of(unit)
     if skeleton.unit_cm is None:
         raise OptionError(
-            f"the length unit of skeleton {skeleton.name!r} is unknown, so it cannot be "
+            f"the length unit of {named('skeleton', skeleton.name)} is unknown, so it cannot be "
             f"converted to {unit}; leave out unit=, or set it when reading"
         )
     return skeleton.unit_cm / unit_cm

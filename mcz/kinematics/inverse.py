@@ -23,6 +23,7 @@ from mcz.kinematics.rotation_fit import center_angles, smallest_angles
 from mcz.kinematics.rotations import ORDERS, continuous, nearest_solutions
 from mcz.kinematics.targets import InitialPose, Targets
 from mcz.model.motion import Skeleton
+from mcz.model.text_format import named
 from mcz.model.types import Bools, Floats, Ints
 
 MOST_STEPS, REPAIR_STEPS, SMOOTHING_STEPS = 50, 20, 10
@@ -212,8 +213,8 @@ def _goals(targets: Targets, points: Floats, markers: Floats | None) -> tuple[Fl
     for kind, (positions, count) in shapes.items():
         if positions is not None and (positions.ndim != 3 or positions.shape[1:] != (count, 3)):
             raise MotionError(
-                f"skeleton {skeleton.name!r} has {count} {kind}, so positions must have shape "
-                f"(n_frames, {count}, 3), not {positions.shape}"
+                f"{named('skeleton', skeleton.name)} has {count} {kind}, so positions must have "
+                f"shape (n_frames, {count}, 3), not {positions.shape}"
             )
     if markers is not None and len(markers) != len(points):
         raise MotionError(f"{len(points)} frames of points, but {len(markers)} of virtual markers")

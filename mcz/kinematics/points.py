@@ -17,6 +17,7 @@ from mcz.hints import Hint
 from mcz.kinematics.chain import Chain, Pose, chain_of, multiply_matrices
 from mcz.model.checks import check_arguments
 from mcz.model.motion import A_MOTION, POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.text_format import named
 from mcz.model.types import Floats
 
 MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
@@ -154,8 +155,8 @@ class _Positions:
 def marker_distance(skeleton: Skeleton) -> float:
     if skeleton.unit_cm is None:
         raise OptionError(
-            f"the length unit of skeleton {skeleton.name!r} is unknown, but virtual markers "
-            "lie 3 cm off its joints",
+            f"the length unit of {named('skeleton', skeleton.name)} is unknown, but virtual "
+            "markers lie 3 cm off its joints",
             hint=Hint.UNIT,
         )
     return MARKER_DISTANCE_CM / skeleton.unit_cm
@@ -172,7 +173,7 @@ def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
     check_radius(radius_cm)
     if skeleton.unit_cm is None:
         raise OptionError(
-            f"the length unit of skeleton {skeleton.name!r} is unknown, but the shell lies "
+            f"the length unit of {named('skeleton', skeleton.name)} is unknown, but the shell lies "
             f"{radius_cm:g} cm off its joints",
             hint=Hint.UNIT,
         )

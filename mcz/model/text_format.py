@@ -30,6 +30,15 @@ def quote_name(name: str) -> str:
     return _SHORT.repr_str(str(name), 1)
 
 
+def named(word: str, name: str) -> str:
+    """A thing in a message; many skeletons, such as those of BVH files, have no name.
+
+    >>> named("skeleton", "05"), named("skeleton", "")
+    ("skeleton '05'", 'the skeleton')
+    """
+    return f"{word} {name!r}" if name else f"the {word}"
+
+
 def quote(word: str | bytes) -> str:
     """The start of a word of a source in quotes; bytes are Latin-1.
 

@@ -46,6 +46,7 @@ from mcz.kinematics.chain import chain_of
 from mcz.kinematics.points import reach
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
 from mcz.model.schema import parse
+from mcz.model.text_format import named
 from mcz.model.types import Floats, Params, Settings
 
 # The greatest error of a point in any frame that a preset promises, in cm.
@@ -144,7 +145,7 @@ def _contacts(
     skeleton, rate = skeleton_of(NAME, source.layout), source.layout.frame_rate
     if skeleton.unit_cm is None:
         raise OptionError(
-            f"contacts: the length unit of skeleton {skeleton.name!r} is unknown, but the "
+            f"contacts: the length unit of {named('skeleton', skeleton.name)} is unknown, but the "
             "tolerance is in cm",
             hint=Hint.UNIT,
         )

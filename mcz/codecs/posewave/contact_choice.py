@@ -32,6 +32,7 @@ from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.points import points_of, positions_of
 from mcz.model.checks import merged_ranges
 from mcz.model.motion import Skeleton
+from mcz.model.text_format import named
 
 Run = tuple[str, int, int]  # a joint whose first point stands, its first frame, number of frames
 Runs = tuple[Run, ...] | str
@@ -107,12 +108,14 @@ def runs_of(source: SignalSource, runs: Runs) -> tuple[Run, ...]:
     layout = source.layout
     skeleton, n_frames = skeleton_of(NAME, layout), layout.n_frames
     if not has_kinematics(skeleton, whole=True):
-        raise OptionError(f"contacts: the angle unit of skeleton {skeleton.name!r} is unknown")
+        raise OptionError(
+            f"contacts: the angle unit of {named('skeleton', skeleton.name)} is unknown"
+        )
     if isinstance(runs, str):
         if not find_feet(skeleton):
             raise OptionError(
-                f"contacts: no joint of skeleton {skeleton.name!r} is named like a foot; name "
-                "the feet, such as contacts=ankle_l,ankle_r"
+                f"contacts: no joint of {named('skeleton', skeleton.name)} is named like a foot; "
+                "name the feet, such as contacts=ankle_l,ankle_r"
             )
         return _detect_runs(source, skeleton, None)
     for name, first, count in runs:

@@ -22,7 +22,7 @@ from mcz.kinematics.points import (
 from mcz.kinematics.targets import unsolved_channels
 from mcz.model.checks import check_arguments
 from mcz.model.motion import A_MOTION, A_SKELETON, Motion, Signal, Skeleton
-from mcz.model.text_format import fields_text
+from mcz.model.text_format import fields_text, named
 
 FARTHEST = 2.0**100  # length units
 
@@ -112,7 +112,8 @@ def from_positions(motion: Motion, base: Skeleton) -> Solved:
     _check_sizes(motion)
     if point_set(base) == "markers":
         raise MotionError(
-            f"skeleton {base.name!r} has only markers, so it cannot be fitted", clip=motion.name
+            f"{named('skeleton', base.name)} has only markers, so it cannot be fitted",
+            clip=motion.name,
         )
     n_points, n_markers = len(point_names(base)), 3 * base.n_joints
     if skeleton.n_joints not in (n_points, n_points + n_markers):

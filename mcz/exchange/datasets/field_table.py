@@ -20,7 +20,7 @@ from mcz.kinematics.poses.trajectories import accelerations_of, find_points, vel
 from mcz.kinematics.rotations import matrices_of_vectors
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import Joints, column_of, signs_of
-from mcz.model.text_format import suggest_names
+from mcz.model.text_format import named, suggest_names
 from mcz.model.types import Floats
 from mcz.model.units import with_axes
 
@@ -115,7 +115,9 @@ def _contacts(subject: Subject, rows: SubjectRows) -> Floats:
 
 def _up_column(skeleton: Skeleton) -> int:
     if not skeleton.up_axis:
-        raise OptionError(f"the up axis of skeleton {skeleton.name!r} is unknown", hint=Hint.UP)
+        raise OptionError(
+            f"the up axis of {named('skeleton', skeleton.name)} is unknown", hint=Hint.UP
+        )
     return column_of(skeleton.up_axis)
 
 

@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics.chain import IDENTITY, Chain, Link, chain_of
+from mcz.kinematics.chain import IDENTITY, Chain, Link, chain_of, knows_angles
 from mcz.kinematics.poses.conversions import (
     Quaternion,
     from_matrices,
@@ -211,7 +211,7 @@ def resample_rows(skeleton: Skeleton | None, old: Floats, times: FrameTimes) -> 
         return old[times.before]
     new = spline_rows(old, times)
     is_posed = skeleton is not None and any(channel.kind for channel in skeleton.channels)
-    if skeleton is not None and is_posed and skeleton.angle_unit:
+    if skeleton is not None and is_posed and knows_angles(skeleton):
         chain = chain_of(skeleton)
         for link in chain.links:
             if link.turns:

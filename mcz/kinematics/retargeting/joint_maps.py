@@ -19,7 +19,7 @@ import numpy as np
 from mcz.errors import MotionError, OptionError
 from mcz.model.motion import POSITION_KINDS, TURNING_KINDS, Channel, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
-from mcz.model.text_format import nearest_names, suggest_names
+from mcz.model.text_format import named, nearest_names, suggest_names
 from mcz.model.types import Floats
 
 LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow")  # parts of a side
@@ -70,7 +70,7 @@ def _recognize_joints(skeleton: Skeleton) -> dict[str, str]:
             best = matches
     if not best:
         raise OptionError(
-            f"joint_map: skeleton {skeleton.name!r} has the joint names of none of "
+            f"joint_map: {named('skeleton', skeleton.name)} has the joint names of none of "
             f"{', '.join(SKELETONS)}"
         )
     return best

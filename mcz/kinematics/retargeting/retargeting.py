@@ -38,6 +38,7 @@ from mcz.kinematics.retargeting.turns import (
 from mcz.kinematics.targets import Targets
 from mcz.model.checks import check_arguments
 from mcz.model.motion import A_MOTION, A_SKELETON, POSITION_KINDS, Motion, Skeleton
+from mcz.model.text_format import named
 from mcz.model.types import Floats
 
 AUTO = "auto"
@@ -98,7 +99,8 @@ def _check(source: Skeleton, target: Skeleton) -> None:
     for skeleton in (source, target):
         if point_set(skeleton) == "markers":
             raise MotionError(
-                f"retarget: skeleton {skeleton.name!r} has only markers, which rotate no bones"
+                f"retarget: {named('skeleton', skeleton.name)} has only markers, "
+                "which rotate no bones"
             )
     if source.up_axis and target.up_axis and source.up_axis != target.up_axis:
         raise OptionError(
