@@ -70,7 +70,7 @@ def order_error(thing: str, label: str, state: str) -> FormatError:
     if state == INDEX:
         return FormatError(f"INDX must be followed by a FOOT, not by {label}")
     if thing == "HEAD":
-        return FormatError(f"a second {label}")
+        return FormatError(f"a second {label} is not allowed")
     if state == CLIP:
         return FormatError(f"chunk {label} is inside a clip")
     return FormatError(f"{label} is outside a clip")

@@ -73,7 +73,7 @@ def _check_source(
         )
     if source.format in others:  # CLIP-04, SKEL-03
         raise FormatError(
-            f"source format {source.format} is of the other sort of source", where=where
+            f"source format {source.format} is not allowed in this chunk", where=where
         )
 
 

@@ -148,7 +148,9 @@ class Motion:
         if self.frame_numbers is not None:
             check_numbers(self.frame_numbers, self.name)
         if self.number_step < 1:
-            raise MotionError(f"a number step of {self.number_step}", clip=self.name)
+            raise MotionError(
+                f"number_step is {self.number_step}; it must be at least 1", clip=self.name
+            )
 
     def _check_roles(self) -> None:
         """Give signals without a role theirs, and check the rules of SPEC.md on roles."""
@@ -167,9 +169,14 @@ class Motion:
             raise MotionError("more than one signal of times", clip=self.name)
         for index, signal in enumerate(self.signals):
             if (signal.role == RESIDUALS) != (signal.of is not None):
-                raise MotionError(f"signal {signal.name!r}: of is {signal.of}", clip=self.name)
+                raise MotionError(
+                    f"signal {signal.name!r}: of is {signal.of}; only residuals refer to a signal",
+                    clip=self.name,
+                )
             if signal.of is not None and (signal.of == index or not 0 <= signal.of < len(roles)):
-                raise MotionError(f"residuals of signal {signal.of}", clip=self.name)
+                raise MotionError(
+                    f"residuals of signal {signal.of}, which does not exist", clip=self.name
+                )
             if signal.role == TIMES:
                 fault = times_signal_fault(signal) or times_fault(signal.masked()[:, 0])
                 if fault:

@@ -74,7 +74,7 @@ class Source:
     def __post_init__(self) -> None:
         check_fields(self, SOURCE)
         if self.size < 0:
-            raise MotionError(f"source: size is {self.size}")
+            raise MotionError(f"source: size is {self.size}; it must not be negative")
 
     def without_file(self) -> Source:
         """A copy for changed values or frames: without size and hash."""
@@ -164,7 +164,9 @@ class Joint:
     def __post_init__(self) -> None:
         check_fields(self, JOINT)
         if sorted(self.axis_order) != ["X", "Y", "Z"]:
-            raise MotionError(f"joint {self.name!r}: axis order {self.axis_order!r}")
+            raise MotionError(
+                f"joint {self.name!r}: axis order {self.axis_order!r} is not one such as XYZ"
+            )
 
 
 AXES = ("", "x", "y", "z", "-x", "-y", "-z")
@@ -246,7 +248,9 @@ class Skeleton:
         for name in ("up_axis", "forward_axis"):
             axis = getattr(self, name).removeprefix("+")
             if axis not in AXES:
-                raise MotionError(f"{name.replace('_', ' ')} {axis!r}")
+                raise MotionError(
+                    f"{name.replace('_', ' ')} {axis!r} is not one of {', '.join(AXES[1:])}"
+                )
             object.__setattr__(self, name, axis)
         if self.up_axis and self.up_axis[-1:] == self.forward_axis[-1:]:  # SKEL-10
             raise MotionError(f"up axis {self.up_axis!r} is parallel to the forward axis")

@@ -109,9 +109,7 @@ def pattern_runs(layout: FrameLayout, notes: RowNotes | None, n_rows: int) -> li
     if not n_rows:
         return []
     if indices.max() >= len(layout.patterns):  # AMC-03
-        raise FormatError(
-            f"source notes: pattern {indices.max()}, but there are {len(layout.patterns)}"
-        )
+        raise FormatError(f"source notes: no pattern {indices.max()} among {len(layout.patterns)}")
     edges = [0, *(np.flatnonzero(np.diff(indices)) + 1).tolist(), n_rows]
     return [(layout.patterns[indices[a]], a, b) for a, b in pairwise(edges)]
 

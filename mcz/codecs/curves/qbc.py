@@ -234,7 +234,7 @@ def _check(fields: QbcHeader, layout: Layout, spans: Sequence[Span]) -> None:
     end = spans[-1].stop if spans else 0
     # QBC-05, QBC-07
     if end > fields.coded_frames or (end < fields.coded_frames and end % fields.delta):
-        raise FormatError(f"qbc: the segments end at frame {end} of {fields.coded_frames}")
+        raise FormatError(f"qbc: the segments end at frame {end}, not {fields.coded_frames}")
 
 
 def _read_segment(

@@ -52,7 +52,9 @@ def parse_units(name: str, stream: bytes, n_frames: int) -> list[Unit]:
         head, at = read_varint(stream, at)
         kind, size = head % 4, head // 4
         if kind > INTRA or not 1 <= size <= left:  # ONLINE-09, ONLINE-10, ONLINE-11
-            raise FormatError(f"{label}: kind {kind} with {size} frames of the remaining {left}")
+            raise FormatError(
+                f"{label}: kind {kind} cannot have {size} of the remaining {left} frames"
+            )
         distance = 0
         if kind == LTR:
             distance, at = read_varint(stream, at)

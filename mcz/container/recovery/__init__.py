@@ -54,7 +54,7 @@ class Shape:
     def __post_init__(self) -> None:
         sound = self.block_size % LANE == 0 < self.block_size and self.n_recovery > 0
         if not sound or not self.size:
-            raise FormatError(f"recovery data: {self}")
+            raise FormatError(f"recovery data: impossible sizes: {self}")
         if run_length(self.n_recovery) + self.n_blocks > MOST_POINTS:
             raise LimitError(
                 f"recovery data: {self.n_blocks} blocks and {self.n_recovery} recovery blocks "

@@ -133,7 +133,7 @@ def _check(described: Deflated) -> None:
         raise FormatError(f"source detail: a stream or blocks do not fit level {described.level}")
     for block in described.blocks:
         if block.codes and block.kind != DYNAMIC:  # ARRAY-21
-            raise FormatError(f"source detail: codes of a block of kind {block.kind}")
+            raise FormatError(f"source detail: a block of kind {block.kind} cannot have codes")
 
 
 def _stored_blocks(contents: bytes) -> Iterable[bytes]:

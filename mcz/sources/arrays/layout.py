@@ -207,7 +207,7 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
         if piece.kind == PieceKind.PART:
             part = piece.start, piece.stop
             if piece.start > piece.stop:  # ARRAY-33
-                raise FormatError(f"source template: frames {piece.start} to {piece.stop}")
+                raise FormatError(f"source template: frames {piece.start} to {piece.stop} descend")
         pieces.append(piece)
     return tuple(pieces)
 
@@ -222,7 +222,9 @@ def check_spans(pieces: Sequence[Piece]) -> None:
     n_file = n_file_pieces(pieces)
     for index, piece in enumerate(pieces[n_file:], n_file):
         if piece.kind in OF_PIECES:  # ARRAY-18
-            raise FormatError(f"source template: piece {index} of kind {piece.kind} in contents")
+            raise FormatError(
+                f"source template: contents cannot have piece {index} of kind {piece.kind}"
+            )
     spans = set()
     checks = [0, *accumulate(piece.kind == PieceKind.CRC for piece in pieces)]
     for piece in pieces:
@@ -230,21 +232,23 @@ def check_spans(pieces: Sequence[Piece]) -> None:
             continue
         if not piece.start <= piece.stop <= len(pieces):  # ARRAY-06
             raise FormatError(
-                f"source template: pieces {piece.start} to {piece.stop} of {len(pieces)}"
+                f"source template: pieces {piece.start} to {piece.stop} exceed the {len(pieces)}"
             )
         if piece.start < n_file < piece.stop:  # ARRAY-19
             raise FormatError(
-                f"source template: pieces {piece.start} to {piece.stop}, of the file and contents"
+                f"source template: pieces {piece.start} to {piece.stop} mix file and contents"
             )
         if piece.kind == PieceKind.CRC:
             if checks[piece.start] != checks[piece.stop]:  # ARRAY-07
-                raise FormatError("source template: a CRC-32 of a CRC-32")
+                raise FormatError("source template: a CRC-32 covers another one")
             if piece.start < piece.stop:  # no pieces overlap none
                 spans.add((piece.start, piece.stop))
     end = 0
     for start, stop in sorted(spans):
         if start < end:  # ARRAY-08
-            raise FormatError(f"source template: CRC-32 of pieces {start} to {stop}, which overlap")
+            raise FormatError(
+                f"source template: CRC-32 of pieces {start} to {stop} overlaps another"
+            )
         end = stop
 
 

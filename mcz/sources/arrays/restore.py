@@ -85,7 +85,9 @@ class _Stored:
 
     def signal(self, piece: Piece) -> Signal:
         if piece.signal >= len(self.signals):  # ARRAY-09
-            raise FormatError(f"source template: signal {piece.signal} of {len(self.signals)}")
+            raise FormatError(
+                f"source template: no signal {piece.signal} among {len(self.signals)}"
+            )
         return self.signals[piece.signal]
 
     def rows(self, piece: Piece) -> range:
@@ -137,13 +139,15 @@ def _size(piece: Piece, stored: _Stored) -> int:
         case PieceKind.COUNT | PieceKind.ROWS | PieceKind.ITEMS:
             stored.signal(piece)
             if piece.kind in INTEGERS and piece.size not in ROW_SIZES:  # ARRAY-30
-                raise FormatError(f"source template: rows in {piece.size} bytes")
+                raise FormatError(
+                    f"source template: a number of rows cannot have {piece.size} bytes"
+                )
             return piece.size
         case PieceKind.DATA:
             signal = stored.signal(piece)
             if any(first + n > signal.n_channels for first, n in piece.runs):  # ARRAY-10
                 raise FormatError(
-                    f"source template: a run beyond the {signal.n_channels} channels of signal "
+                    f"source template: a run exceeds the {signal.n_channels} channels of signal "
                     f"{signal.name!r}"
                 )
             return len(stored.rows(piece)) * piece.n_columns * int(TYPES[piece.type][1])
@@ -156,17 +160,17 @@ def _bytes(piece: Piece, stored: _Stored, starts: Sequence[int]) -> Any:
         size = SIZES[piece.kind]
         number = starts[piece.stop] - starts[piece.start]
         if number >= 256**size:  # ARRAY-12, ARRAY-32
-            raise FormatError(f"source template: a size of {number} in {size} bytes")
+            raise FormatError(f"source template: a size of {number} does not fit {size} bytes")
         return number.to_bytes(8, "little")[:size]
     if piece.kind in INTEGERS:
         number = len(stored.rows(piece)) * (piece.start if piece.kind == PieceKind.ITEMS else 1)
         if number >= 2 ** (8 * piece.size - (piece.size == 4)):  # ARRAY-31
-            raise FormatError(f"source template: {number} in {piece.size} bytes")
+            raise FormatError(f"source template: {number} does not fit {piece.size} bytes")
         return number.to_bytes(8, "little")[: piece.size]
     if piece.kind == PieceKind.COUNT:  # ARRAY-13
         text = b"%d" % len(stored.rows(piece)) + piece.after
         if len(text) > piece.size:  # ARRAY-11
-            raise FormatError(f"source template: {len(text)} bytes of a count, not {piece.size}")
+            raise FormatError(f"source template: a count of {len(text)} bytes, not {piece.size}")
         return text.ljust(piece.size)
     if piece.kind == PieceKind.DATA:
         return _words(piece, stored)

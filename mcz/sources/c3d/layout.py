@@ -189,7 +189,7 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> C3dLayou
         parsed = parse(C3dOutputsTemplate, template, "source template")
         shared, outputs = parsed.file, tuple(parsed.outputs)
         if 0 in outputs[1:]:  # C3D-17
-            raise FormatError("source template: a run of no points")
+            raise FormatError("source template: a run has no points")
         if sum(outputs) != shared.points:  # C3D-18
             raise FormatError(
                 f"source template: runs of {sum(outputs)} points, but there are {shared.points}"
@@ -200,10 +200,10 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> C3dLayou
     if own.zeros > MAX_ZEROS:  # C3D-13
         raise LimitError(f"source detail: {own.zeros} zeros, limit {MAX_ZEROS}")
     if shared.word == 4 and shared.unsigned:  # C3D-04
-        raise FormatError("source template: unsigned floats")
+        raise FormatError("source template: floats cannot be unsigned")
     # C3D-07, C3D-08
     if (shared.rotations and shared.word != 4) or (shared.gap and not shared.rotations):
-        raise FormatError("source template: rotations of integers, or a gap without rotations")
+        raise FormatError("source template: rotations must be floats, and a gap needs rotations")
     head, fields = bytearray(shared.head), []
     end = n_used = 0
     for entry in shared.fields:
@@ -215,7 +215,7 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> C3dLayou
         n_used += kind.size
         fields.append((entry.at, kind))
     if n_used != len(own.values) or len(head) != len(shared.head):  # C3D-12
-        raise FormatError(f"source detail: {len(own.values)} bytes of fields, not {n_used}")
+        raise FormatError(f"source detail: fields have {len(own.values)} bytes, not {n_used}")
     return C3dLayout(
         ByteOrder(shared.processor),
         shared.word,

@@ -202,7 +202,7 @@ def parse_sections(template: bytes, detail: bytes, sizes: Sequence[int]) -> list
     shared = parse(TableTemplate, template, "source template", {"runs": MAX_RUNS}).sections
     own = parse(TableDetail, detail, "source detail", {"runs": MAX_RUNS}).details
     if not shared or len(shared) != len(own):  # TABLE-07
-        raise FormatError(f"source template: {len(shared)} sections, {len(own)} details")
+        raise FormatError(f"source template: {len(shared)} sections, but {len(own)} details")
     numbers = [number for fields in shared for number in fields.signals]
     if max(numbers, default=0) >= len(sizes) or len(set(numbers)) < len(numbers):  # TABLE-08
         raise FormatError(f"source template: signals {numbers[:8]} of {len(sizes)}")
@@ -211,7 +211,7 @@ def parse_sections(template: bytes, detail: bytes, sizes: Sequence[int]) -> list
 
 def _section(shared: SectionFields, detail: Detail, sizes: Sequence[int]) -> Section:
     if not shared.signals:  # TABLE-08
-        raise FormatError("source template: a section without signals")
+        raise FormatError("source template: a section has no signals")
     clock = parse_clock(shared)
     n_columns = sum(sizes[number] for number in shared.signals) + 1 + bool(shared.clock)  # TABLE-01
     rows = parse_patterns((shared.header,), shared, detail, n_columns)
@@ -225,7 +225,7 @@ def parse_clock(shared: SectionFields) -> Clock | None:
     if fields is None:
         return None
     if fields.grid.kind not in DECIMALS:  # TABLE-02
-        raise FormatError(f"source template: times on a grid {fields.grid.kind.name}")
+        raise FormatError(f"source template: times cannot have grid {fields.grid.kind.name}")
     return Clock(fields.grid, fields.numerator, fields.denominator, fields.offset)
 
 
@@ -238,7 +238,7 @@ def fill_marks(header: bytes, names: Sequence[str], count: bytes) -> bytes:
         if mark == NAME:
             joint += 1
             if joint > len(names):  # TABLE-05
-                raise FormatError(f"source template: a name of joint {joint} of {len(names)}")
+                raise FormatError(f"source template: no joint {joint} among {len(names)}")
             text = names[joint - 1].encode()
         elif mark == COUNT:
             text = count

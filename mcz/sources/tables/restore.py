@@ -41,7 +41,7 @@ def restore_table(motion: Motion) -> bytes:
     notes = source.notes if isinstance(source.notes, TableNotes) else TableNotes(())
     if len(notes.sections) > len(sections):  # TABLE-09
         raise FormatError(
-            f"source notes for {len(notes.sections)} sections, the template has {len(sections)}"
+            f"source notes have {len(notes.sections)} sections, but the template {len(sections)}"
         )
     tables = [_section_table(motion, section) for section in sections]
     limit = text_limit(source, [table.values.shape for table, _ in tables])

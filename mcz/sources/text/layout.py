@@ -214,7 +214,7 @@ def parse_layout(template: bytes, detail: bytes, n_channels: int) -> FrameLayout
     shared = parse(Template, template, "source template", {"runs": MAX_RUNS})
     own = parse(Detail, detail, "source detail", {"runs": MAX_RUNS})
     if len(shared.header) not in (1, 2):  # SRC-03
-        raise FormatError(f"source template: {len(shared.header)} parts of a header (1 or 2)")
+        raise FormatError(f"source template: a header has 1 or 2 parts, not {len(shared.header)}")
     return parse_patterns(tuple(shared.header), shared, own, n_channels)
 
 
@@ -223,13 +223,15 @@ def parse_patterns(
 ) -> FrameLayout:
     """The layout of the fields of a template and of a detail; raises FormatError."""
     if len(shared.patterns) > 1:  # SRC-04
-        raise FormatError(f"source template: {len(shared.patterns)} patterns (0 or 1)")
+        raise FormatError(
+            f"source template: 0 or 1 patterns are allowed, not {len(shared.patterns)}"
+        )
     if len(own.patterns) >= MAX_PATTERNS:  # SRC-06
         raise LimitError(f"source detail: {len(own.patterns)} patterns, limit {MAX_PATTERNS - 1}")
     if own.patterns and not shared.patterns:  # SRC-05
-        raise FormatError("source detail: patterns, though the template has none")
+        raise FormatError("source detail: it has patterns, but the template has none")
     if (own.rows and not own.count) or (own.ending and not own.ends):  # SRC-14, SRC-15
-        raise FormatError("source detail: rows without count, or ending though ends is 0")
+        raise FormatError("source detail: rows have no count, or end although ends is 0")
     gaps = [*shared.gaps, *own.gaps]
     patterns = [
         _pattern(fields, gaps, n_channels, f"pattern {number}")
@@ -242,17 +244,15 @@ def parse_patterns(
 def _pattern(fields: Any, gaps: Sequence[bytes], n_channels: int, where: str) -> Pattern:
     """PATTERN with its gaps in place, checked: no column twice, none beyond the channels."""
     if any(run.gap >= len(gaps) for run in fields.runs) or fields.tail >= len(gaps):  # SRC-08
-        raise FormatError(f"{where}: a gap beyond the last, {len(gaps) - 1}")
+        raise FormatError(f"{where}: a gap exceeds the last, {len(gaps) - 1}")
     spans = sorted((run.column, run.n_columns) for run in fields.runs)
     free = 0
     for column, n_columns in spans:
         if column < free or n_columns < 1 or (column == 0 and n_columns > 1):  # SRC-09, SRC-10
-            raise FormatError(
-                f"{where}: {n_columns} columns from {column}, expected {free} or more"
-            )
+            raise FormatError(f"{where}: {n_columns} columns begin at {column}, before {free}")
         free = column + n_columns
     if free > n_channels + 1:  # SRC-11
-        raise FormatError(f"{where}: channel {free - 2}, but there are {n_channels}")
+        raise FormatError(f"{where}: no channel {free - 2} among {n_channels}")
     runs = [Run(gaps[r.gap], r.column - 1, r.n_columns, r.width) for r in fields.runs]
     pattern = Pattern(tuple(runs), gaps[fields.tail])
     if pattern.gap_size > MAX_ROW_GAPS:  # SRC-16
@@ -361,7 +361,7 @@ def parse_runs(runs: Sequence[PatternRun], n_rows: int, where: str) -> list[tupl
         # AMC-01, AMC-02
         if run.n_rows < 1 or run.n_rows > n_rows - row or run.pattern >= MAX_PATTERNS:
             raise FormatError(
-                f"pattern {run.pattern} for {run.n_rows} rows from {row} on", where=where
+                f"pattern {run.pattern} cannot have {run.n_rows} rows from {row} on", where=where
             )
         checked.append((row, row + run.n_rows, run.pattern))
         row += run.n_rows
@@ -380,5 +380,7 @@ def parse_texts(texts: Sequence[NumberText], n_rows: int, where: str) -> list[tu
 def _rows(distances: Sequence[int], n_rows: int, where: str) -> list[int]:
     """The rows from their distances, checked: each later than the one before, and below n_rows."""
     if 0 in distances[1:] or (distances and sum(distances) >= n_rows):  # AMC-04
-        raise FormatError(f"rows {distances[:8]} of {n_rows}", where=where)
+        raise FormatError(
+            f"rows at distances {distances[:8]} repeat, or exceed the {n_rows} rows", where=where
+        )
     return list(accumulate(distances))
