@@ -130,6 +130,7 @@ PARTS = [
 ITEMS = [b"'descr': '<f8'", ORDER, b"'shape': (3, 2)"]
 
 
+@pytest.mark.filterwarnings("ignore:Reading `.npy`:UserWarning")  # NumPy, of a header of Python 2
 @given(
     st.lists(st.tuples(st.integers(0, 80), st.integers(0, 24), st.sampled_from(PARTS))), st.data()
 )
