@@ -147,7 +147,7 @@ class AccessError(OptionError):
 
 
 class ExistsError(OptionError):
-    """The target exists already, and nobody said that it may be replaced."""
+    """The target exists, and replacing it was not requested."""
 
 
 class OutOfRangeError(OptionError, IndexError):

@@ -11,9 +11,9 @@ import pytest
 import mcz
 from mcz.codecs.contract import Codec, Layout, Request, Span
 from mcz.codecs.lossless import best, fast
-from mcz.codecs.posewave.model import start_tables
+from mcz.codecs.posewave.model import start_coder, start_tables
 from mcz.codecs.posewave.model_state import USUAL
-from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
+from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head
 from mcz.model.numbers import Grid, GridKind
 from tests.test_spec import SPEC
 from tools.spec_traces import best as trace_of_best
@@ -60,7 +60,7 @@ def test_posewave_decodes_the_same_rows() -> None:
     start = start_tables()[0]
     header = SimpleNamespace(prior=None, refining=False, dependent=True, start=start)
     n = len(posewave.CLASSES)
-    coder = fresh_coder(start)
+    coder = start_coder(start)
     rows = RowCoder(header, np.array(posewave.CLASSES), np.ones(n, bool), coder, "rows")
     for level, (kind, n_rows) in enumerate(posewave.LEVELS):
         rows.begin(level, kind, n_rows, Stream(coder, 0, posewave.STREAMS[level]))
@@ -79,7 +79,7 @@ def test_digest_of_the_state_of_posewave(vector: str) -> None:
     n = len(classes)
     start = start_tables()[0]
     header = SimpleNamespace(prior=None, refining=False, dependent=dependent, start=start)
-    coder = fresh_coder(start)
+    coder = start_coder(start)
     rows = RowCoder(header, classes, np.ones(n, bool), coder, "rows")
     for level, (kind, n_rows) in enumerate(posewave_state.levels_of(frames, n_levels)):
         stream = Stream(coder, 0, levels[level])

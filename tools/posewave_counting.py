@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.coding import mixing
 from mcz.codecs.posewave import decision_kernels, row_coder, segment
-from mcz.codecs.posewave.model import Prior, Start, make_model
+from mcz.codecs.posewave.model import Prior, Start, make_model, start_coder
 from mcz.codecs.posewave.model_state import N_OPINIONS, Model
 
 Ints = NDArray[np.int64]
@@ -48,10 +48,10 @@ class Counting:
     """Makes the codec's coders count, and keeps the model of the last segment."""
 
     def __init__(self) -> None:
-        fresh = row_coder.fresh_coder
+        fresh = start_coder
         decision_kernels.learn_bit = counting_learn
         mixing._learn = counting_learn_small
-        segment.fresh_coder = lambda start: triple_states(fresh(start))
+        segment.start_coder = lambda start: triple_states(fresh(start))
         row_coder.make_model = self.make_model
 
     def make_model(self, classes: Ints, start: Start, coder: Ints, prior: Prior | None) -> Model:

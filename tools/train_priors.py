@@ -24,9 +24,16 @@ from numpy.typing import NDArray
 
 from mcz.codecs.posewave import choices
 from mcz.codecs.posewave.header import Header, parse_posewave_header
-from mcz.codecs.posewave.model import PRIOR_ROWS, UNITS, VARIANCE, VARIANCE_UNITS, layout_of
+from mcz.codecs.posewave.model import (
+    PRIOR_ROWS,
+    UNITS,
+    VARIANCE,
+    VARIANCE_UNITS,
+    layout_of,
+    start_coder,
+)
 from mcz.codecs.posewave.orders import Orders
-from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
+from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head
 from mcz.codecs.posewave.segment import classes_of, encode_segment, kinds_of
 from mcz.model.motion import Skeleton
 from tools.training_clips import Piece, pieces_of, read, step_of
@@ -75,7 +82,7 @@ def coarsest_rows(header: Header, skeleton: Skeleton, values: Floats) -> tuple[F
     weights = choices.weights_of(header.step * (skeleton.unit_cm or 1.0))
     streams, _ = encode_segment(header, skeleton, values, weights)
     _, data = Orders(header.orders, skeleton).read_notes(streams[0], len(values), "training")
-    coder, classes = fresh_coder(header.start), classes_of(skeleton, header.whole)
+    coder, classes = start_coder(header.start), classes_of(skeleton, header.whole)
     stream = Stream(coder, 0, data)
     moving, numbers = np.zeros((2, len(classes)), np.int64)
     code_head(stream, kinds_of(skeleton, header.whole), moving, numbers, "training")

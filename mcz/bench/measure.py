@@ -146,7 +146,7 @@ def speeds(case: Case, variant: Variant, params: Params) -> Record:
 def codec_calls(
     motion: Motion, name: str, params: Params
 ) -> tuple[Callable[[], object], Callable[[], object]]:
-    """Encoding and decoding by the codec alone, of the values that it stores."""
+    """Functions that encode and decode the stored values by the codec alone."""
     codec = codec_by_name(name)
     options = codec.options(params)
     stored_motion = prepare(motion, codec, params).motion

@@ -1,7 +1,7 @@
 """General compressors on the same clips: the installed ones, and their inputs.
 
-Extra ``bench`` in pyproject.toml installs them. None of them restores a motion file from the
-matrix: text, skeleton and spelling would be added.
+Extra ``bench`` in pyproject.toml installs them. None of them restores a motion file: text, skeleton
+and spelling would have to be added.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Work as tasks that run in separate processes, with a cache of results.
 
 A task has a kind and plain arguments, so that it can be sent between processes and hashed to a key.
-A table of kinds, which the runner is given, has the functions: ``KINDS``, or an extension of it.
-Speeds and memory are measured one task at a time, with no other task running.
+The runner gets a table of kinds, ``KINDS`` or an extension of it, with their functions. Speeds and
+memory are measured one task at a time, with no other task running.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ KINDS: Mapping[str, TaskKind] = {
     "sweep": TaskKind(_sweep),  # n_points
     "point": TaskKind(_point),  # pairs of parameter and value
     "speeds": TaskKind(_speeds, alone=True),  # pairs of parameter and value
-    "peers": TaskKind(_peers, alone=True),  # names of the installed ones
+    "peers": TaskKind(_peers, alone=True),  # names of the installed peers
 }
 
 
@@ -90,7 +90,7 @@ def perform(task: Task, kind: TaskKind) -> Any:
     """The result of a task; ``{"error": ...}`` if the clip or a parameter is refused."""
     try:
         with warnings.catch_warnings():
-            # already given when the key was computed
+            # the computation of the key has warned
             warnings.simplefilter("ignore", SkeletonWarning)
             return kind.work(task)
     except MczError as error:
@@ -140,7 +140,7 @@ class Runner:
         progress: Progress | None = None,
     ) -> None:
         self.jobs, self.cache, self.kinds = jobs, cache, kinds
-        self.progress = progress or (lambda done, total, what: None)
+        self.progress = progress or (lambda done, total, label: None)
         self.n_cached = self.n_run = 0
 
     def run(self, tasks: Iterable[Task]) -> dict[Task, Any]:
@@ -174,7 +174,7 @@ class Runner:
                 self.progress(len(results), total, task.label)
                 self._keep(task, perform(task, self.kinds[task.kind]), results)
             return
-        # New processes, not copies of this one: their memory is their own, and their threads.
+        # Spawned processes, not forks: they share neither memory nor threads with this one.
         with ExitStack() as stack:
             if alone:
                 stack.enter_context(_one_thread())
@@ -201,7 +201,7 @@ class Runner:
         self.cache.put(key_of(task), result)
 
 
-# Of this folder; no measured figure depends on a file of cli/.
+# Files of this folder that figures depend on; none depends on cli/.
 MEASURING = ("cases.py", "measure.py", "peers.py", "tasks.py")
 
 

@@ -1,4 +1,4 @@
-"""Groups of commands, each of which is loaded when it is called.
+"""Groups of commands; a command is loaded when it is called.
 
 Commands reject repeated options, unless an option makes a list.
 """

@@ -284,7 +284,7 @@ class PreviewSelection(ClipSelection):
 def preview_motion(clip: Clip) -> Motion:
     """The preview as a motion at a lower frame rate, without the further signals and the source.
 
-    A last frame that is nearer to the one before is left out.
+    A last frame at a shorter distance is left out.
     """
     from mcz.model.clock import Timeline
     from mcz.model.motion import Motion, Signal

@@ -71,7 +71,7 @@ def open_motion(
 def frame_bounds(
     frames: tuple[int, int | None] | None, motion: Motion | Clip
 ) -> tuple[int, int] | None:
-    """``--frames`` with its end, of this motion."""
+    """``--frames`` as (start, stop) of this motion."""
     if frames is None:
         return None
     start, stop = frames

@@ -119,7 +119,7 @@ def _verify_bag(
         )
     with errors_about(folder), Progress() as progress:
         bag = check_bag(folder, progress)
-    fine, documents, files = not bag.problems, [], []
+    is_valid, documents, files = not bag.problems, [], []
     for name in bag.files:
         if not name.lower().endswith(".mcz"):
             continue
@@ -135,21 +135,21 @@ def _verify_bag(
             rows = [_row("file", "", [error.describe(OPTION_HINTS, with_path=False)])]
         failed = [row for row in rows if row["problems"]]
         files.append({"file": name, "verified": not failed, "parts": rows})
-        fine = fine and not failed
+        is_valid = is_valid and not failed
         if not failed and not as_json:
             echo(f"{path}: {success}")
         _print_problems(path, failed)
     if report_file is not None:
-        report_file.write_bag(bag, fine, files, documents)
+        report_file.write_bag(bag, is_valid, files, documents)
     if as_json:
-        document = {"verified": fine, "mode": "quick" if quick else "full"}
+        document = {"verified": is_valid, "mode": "quick" if quick else "full"}
         print_json(document | {"problems": bag.problems, "files": files})
     elif not bag.problems:
         count = plural(len(bag.files), "file")
         echo(f"{folder}: a valid bag, {count}, {bag.n_bytes:,} bytes")
     for problem in bag.problems:
         say(f"{folder}: {problem}")
-    return Exit.FINE if fine else Exit.NOT_VERIFIED
+    return Exit.FINE if is_valid else Exit.NOT_VERIFIED
 
 
 def _verify_fully(
@@ -181,7 +181,7 @@ def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[J
 
     target = bytes_or_path(file)
     with errors_about(file), Progress() as progress:
-        seen, problems = quick_check(target, lambda done, total: progress(done, total, file))
+        scanned, problems = quick_check(target, lambda done, total: progress(done, total, file))
     if report_file is not None:
         try:
             with open_input(file) as opened_file:
@@ -190,10 +190,10 @@ def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[J
             if not is_malformed(error):
                 raise
             report_file.take_bytes(file)
-    counts = f"{seen.n_chunks:,} chunks"
-    if seen.n_packets:
-        counts += f", {seen.n_packets:,} packets"
-    if not seen.indexed:
+    counts = f"{scanned.n_chunks:,} chunks"
+    if scanned.n_packets:
+        counts += f", {scanned.n_packets:,} packets"
+    if not scanned.indexed:
         counts += ", no index"
     rows = [_row("checksums", "", [f"at {p.offset}: {in_options(p.message)}" for p in problems])]
     return rows, f"checksums right, {counts}; values and sources were not checked"
@@ -223,7 +223,7 @@ def _row(kind: str, name: str, problems: list[str]) -> JsonObject:
 def _counts(rows: list[JsonObject]) -> Iterator[str]:
     words = {"structure": "every chunk checked", "source": "source identical"}
     for kind, count in Counter(row["kind"] for row in rows).items():
-        if kind == "recovery data":  # of which one set covers a part of the file
+        if kind == "recovery data":  # each set covers a part of the file
             yield f"{plural(count, 'part')} with recovery data"
         else:
             yield words.get(kind) or plural(count, kind)
@@ -237,11 +237,11 @@ def _compare(file: File, source: str) -> JsonObject:
         restored = restore()
     if restored == expected:
         return _row("source", source, [])
-    same = next(
+    at = next(
         (i for i, (a, b) in enumerate(zip(restored, expected, strict=False)) if a != b),
         min(len(restored), len(expected)),
     )
-    text = f"differs from byte {same} on; restored {len(restored)} bytes, compared {len(expected)}"
+    text = f"differs from byte {at} on; restored {len(restored)} bytes, compared {len(expected)}"
     return _row("source", source, [text])
 
 

@@ -70,9 +70,9 @@ def _by_sensitivity(skeleton: Skeleton, sample: Floats, turns: Bools, degrees: F
 def sensitivities(skeleton: Skeleton, values: Floats, max_frames: int | None = None) -> Floats:
     """The rms, over frames and all points, of |d position / d channel|, (n_channels,).
 
-    In length units per source unit of the channel, 0 for plain scalars. ``values`` are those of the
-    frames, (n_frames, n_channels); at most ``max_frames`` of them are used, evenly spread. Frames
-    in which a channel or a point below it is NaN do not count.
+    The unit is length units per source unit of the channel; 0 for plain scalars. ``values`` are
+    those of the frames, (n_frames, n_channels); at most ``max_frames`` of them are used, evenly
+    spread. Frames in which a channel or a point below it is NaN do not count.
     """
     if max_frames is not None:
         if max_frames < 1:

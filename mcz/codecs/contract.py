@@ -205,7 +205,7 @@ class LiveEncoder(Protocol):
     models: tuple[Model, ...]
     version: int | None
     preset: int = 0
-    is_reference: bool = False  # the last frame does not need the one before
+    is_reference: bool = False  # the last frame does not need the previous one
 
     def push(self, values: Floats, valid: Bools | None = None) -> tuple[bytes, bool]:
         """Encode the next frame, (n_channels,): its stream, and True if its segment is fresh."""

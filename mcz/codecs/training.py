@@ -202,9 +202,9 @@ class Recipe:
     a later one, DCT coefficients of "windows". ``mirror`` and ``headings`` add mirrored and turned
     copies of the clips; ``every`` uses only every n-th frame, or step.
 
-    Why steps? A codec codes changes: differences of frames, or windows of which all but one
-    coefficient in time are of movement. Bases learned from steps take fewer bits there at equal
-    error than bases of the positions themselves, whose energy is in the place of the figure.
+    Why steps? A codec codes changes: differences of frames, or windows in which all but one
+    coefficient in time represent movement. Bases learned from steps take fewer bits there at equal
+    error than bases of the positions themselves, whose energy is mostly the place of the figure.
     """
 
     sparsity: int = SPARSITY

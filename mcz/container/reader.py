@@ -69,7 +69,7 @@ _row_text = attrgetter(
 )  # fields of a clip in both CLIP and the index
 KEPT_SKELETONS = 8  # parsed skeletons of a file
 FEW_CLIPS = 16  # of a file, whose CLIPs are parsed one by one
-TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
+TABLE_PEEK = 32  # bytes of a segment, plus 7/4 a stream, that are read first for its table
 
 
 class Container:
@@ -201,11 +201,11 @@ class Container:
 
     def add_shared(self, kind: bytes, payload: bytes) -> None:
         """Add a lost SKEL, MODL or SRCE to a damaged file, past its end."""
-        better = self.source if isinstance(self.source, Overlay) else Overlay(self.source, {})
-        end = max([self.source.size, *(at + len(part) for at, part in better.parts.items())])
+        overlay = self.source if isinstance(self.source, Overlay) else Overlay(self.source, {})
+        end = max([self.source.size, *(at + len(part) for at, part in overlay.parts.items())])
         chunk = build_chunk(kind, payload)
         self.broken = [row for row in self.broken if not is_like(self.source, row[0], chunk)]
-        self.source = better.with_more({end: chunk})
+        self.source = overlay.with_more({end: chunk})
         self.directory.shared[kind, chunk_id(kind, payload)] = Chunk(kind, 0, end, len(payload))
 
     def model(self, id_: bytes) -> payloads.Modl:
@@ -231,7 +231,7 @@ class Container:
         return self._find_skeleton(id_)[0]
 
     def _find_skeleton(self, id_: bytes) -> tuple[payloads.Skel, Skeleton]:
-        """The fields and the skeleton; the last ones are kept, for clips share them."""
+        """The fields and the skeleton; the last ones are cached, since clips share them."""
         entry = self._skeletons.get(id_)
         if entry is None:
             payload, label = self._shared_payload(ChunkType.SKEL, id_)
@@ -249,7 +249,7 @@ class Container:
         return fields.data
 
     def clip(self, row: ClipRow, *, shared: bool = False) -> payloads.Clip:
-        """The fields of CLIP, compared with the index; ``shared`` ones may not be changed."""
+        """The fields of CLIP, compared with the index; ``shared`` ones are read-only."""
         head, shared = self.directory.head, shared and len(self.directory.clips) > FEW_CLIPS
         fields = parse_clip(self.payload(row.clip), head, row.clip.label, shared=shared)
         row_of_fields = ClipRow.of(fields, row.clip)

@@ -277,7 +277,7 @@ class Overlay(ByteSource):
         return bytes(data)
 
     def with_more(self, parts: Mapping[int, bytes]) -> Overlay:
-        """The same source with further ``parts``."""
+        """A copy with further ``parts``."""
         return Overlay(self._source, self.parts | dict(parts))
 
     def close(self) -> None:

@@ -234,7 +234,7 @@ class _BagValidator:
         return rows
 
     def _check_listing(self, payload: dict[str, dict[str, str]]) -> None:
-        """Check that every file is in every manifest, before version 1.0 in one of them."""
+        """Check that every file is in every manifest, or in one before version 1.0."""
         everywhere = self.check.version == "1.0"
         for path in self.check.files:
             absent = [name for name, rows in payload.items() if path not in rows]

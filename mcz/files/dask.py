@@ -55,7 +55,7 @@ def verify(
     max_decoded: int | None = None,
     where: Where | None = None,
 ) -> list[Problem]:
-    """Check an MCZ file as ``mcz.verify``, its clips on the workers of ``client``.
+    """Check an MCZ file as ``mcz.verify`` does, with clips on the workers of ``client``.
 
     ``target`` is a path or URL that all of them can read; ``client`` is as in ``pack``. Raises as
     ``mcz.verify``, and WorkerError if machines are lost.

@@ -38,7 +38,7 @@ from mcz.sources import FORMATS
 if TYPE_CHECKING:
     from mcz.files.reading.file import File
 
-LEAST_BYTES = 8_000_000  # of source files; fewer are done before a worker has started
+LEAST_BYTES = 8_000_000  # of source files; fewer are processed before a worker has started
 LEAST_STORED = 2_000_000  # the same for an MCZ file
 DEFAULT_JOBS = 1  # a library must not start processes unasked
 

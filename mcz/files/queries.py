@@ -66,7 +66,7 @@ class Query:
         return tuple(dict.fromkeys(names_in(self.tree)))
 
     def matches(self, lookup: Lookup) -> bool:
-        """Return True if the query is true, not false or unknown, of the values in ``lookup``.
+        """Return True if the query is true (not false or unknown) for the values of ``lookup``.
 
         ``lookup(name)`` returns a text, a number, a truth, or None for a missing value; a name is
         looked up only when its part of the query is reached.
@@ -184,7 +184,7 @@ class _Parser:
         return Compare(left, sign.raw, right)
 
     def chain(self, sign: Token) -> str:
-        """Suggest another form of a < b < c, of which a < b is already parsed."""
+        """Suggest another form of a < b < c, after a < b was parsed."""
         left, right = (self.tokens[self.at - back].raw for back in (3, 1))
         last = self.tokens[self.at + 1].raw or "..."
         return f"{left} {sign.raw} {right} and {right} {self.token.raw} {last}"

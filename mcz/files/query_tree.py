@@ -167,7 +167,7 @@ class Compare:
 
 @dataclass(frozen=True, slots=True)
 class In:
-    """``operand in (a, b)``, of at least one literal."""
+    """``operand in (a, b)``, with at least one literal."""
 
     operand: Operand
     literals: tuple[Literal, ...]

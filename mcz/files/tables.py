@@ -75,7 +75,7 @@ def table_of(motion: Motion) -> Table:
 def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> list[str]:
     """``joint.channel`` of every column, or ``joint`` with one number; ``joint#n`` if repeated.
 
-    Of a signal with ``own`` channels their names, or ``channel-n`` without one.
+    For a signal with ``own`` channels their names, or ``channel-n`` without one.
     """
     if own is not None:
         return [channel.label or f"channel-{n}" for n, channel in enumerate(own)]
@@ -127,8 +127,8 @@ def _csv_of(rows: Iterable[Sequence[object]]) -> bytes:
 def to_npz(table: Table) -> bytes:
     """A NumPy archive of values, mask, frames, rate, names and, if known, times and units.
 
-    Of a whole motion also its skeleton and poses (``pose_arrays``). ``sample_rate`` counts rows a
-    second, of which a frame may have several. No pickles.
+    A whole motion has also its skeleton and poses (``pose_arrays``). ``sample_rate`` counts rows a
+    second; a frame may have several. No pickles.
     """
     rate = table.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) >= 2**63:

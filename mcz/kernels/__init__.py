@@ -103,7 +103,7 @@ def lacks_compiled_kernels() -> bool:
 
 
 def _unit(name: str) -> tuple[ModuleType | None, str]:
-    with _LOADING:  # two threads would execute one module, and one of them see half of it
+    with _LOADING:  # of two threads that import a module, one would see half of it
         return _loaded(name)
 
 
@@ -177,7 +177,7 @@ def bit_length(value: int) -> int:
 
 
 def trailing_zeros(value: int) -> int:
-    """Zeros below the lowest bit that is set; of 0: 64."""
+    """Zeros below the lowest bit that is set; 64 for 0."""
     return bit_length(value & -value) - 1 if value else 64
 
 
@@ -197,5 +197,5 @@ def wrapped(value: int) -> int:
 
 
 def truncated(value: float) -> int:
-    """``int(value)``, quicker than that, of values below 2^63 in size."""
+    """``int(value)`` for magnitudes below 2^63, but faster."""
     return int(value)

@@ -98,11 +98,11 @@ class Link:
 class Pose:
     """Joint transforms of a block of F frames.
 
-    Of each joint ``origins`` has its position, (3, F) or (3, 1) if it is constant; ``axes`` its
-    local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
-    along the parent's local axes before the parent's scale, (3, F) or (3, 1); ``spins`` the
-    rotation axis in the world of each of its columns ``turning``, (3, F) or (3, 1), for a unit of a
-    quaternion's part, or a radian of any other.
+    By joint: ``origins`` has its position, (3, F) or (3, 1) if it is constant; ``axes`` its local
+    axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin along the
+    parent's local axes before the parent's scale, (3, F) or (3, 1); ``spins`` the rotation axis in
+    the world of each of its columns ``turning``, (3, F) or (3, 1), for a unit of a quaternion's
+    part, or a radian of any other.
     """
 
     origins: list[Floats]
@@ -283,7 +283,7 @@ class Chain:
     def _quaternion(axes: Floats, parts: Floats, spins: list[Floats]) -> Floats:
         """Turn ``axes`` by quaternions, (4, F), of any length but 0.
 
-        Adds the rotation axes in the world of a change of each part to ``spins``.
+        Appends to ``spins`` the rotation axis in the world for a change of each part.
         """
         square = (parts * parts).sum(axis=0)
         w, x, y, z = parts

@@ -1,7 +1,7 @@
 """Points of a skeleton: names, positions over time, and motions of a marker at each of them.
 
-SPEC.md, "Kinematics", defines the points; its section "Positions" defines the fields of a clip of
-markers. ``mcz/exchange/conversion/marker_fit.py`` is the inverse.
+SPEC.md, "Kinematics", defines the points; its section "Positions" defines the fields of a marker
+clip. ``mcz/exchange/conversion/marker_fit.py`` is the inverse.
 """
 
 from __future__ import annotations

@@ -187,10 +187,10 @@ def _hold_last(angles: Floats, known: Floats) -> Floats:
 
 
 def nearest_solutions(angles: Floats) -> Floats:
-    """Choose (a, b, c) or (a + pi, pi - b, c + pi) per frame, the one nearer to the frame before.
+    """Choose (a, b, c) or (a + pi, pi - b, c + pi) per frame, nearer to the previous frame.
 
-    The nearer one does not depend on the choice of the frame before, as both change alike; so
-    changes can be found for all frames together.
+    The nearer one does not depend on the previous choice, as both change alike; so changes can be
+    found for all frames together.
     """
     other = angles * [1, -1, 1] + np.pi
     stays, changes = (

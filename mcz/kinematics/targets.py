@@ -27,7 +27,7 @@ TYPICAL_LEVER = 0.125  # of the reach: a turn by one radian counts as a move by 
 
 @dataclass(frozen=True, slots=True)
 class JointTarget:
-    """A position of ``joint``: its tail of that number or, -1, its origin; ``axis`` of a marker."""
+    """A point of ``joint``: tail number ``tail``, or its origin if -1; ``axis`` of a marker."""
 
     joint: int
     tail: int
@@ -38,7 +38,7 @@ class Targets:
     """The targets of a skeleton in the order of their positions: points, then virtual markers.
 
     ``units``, (n_channels,): the source units of each channel that count as one length unit, the
-    measure of all steps; 0 of channels that move no target.
+    measure of all steps; 0 for channels that move no target.
     """
 
     def __init__(self, skeleton: Skeleton, *, markers: bool) -> None:
@@ -111,8 +111,8 @@ class Targets:
                     jacobian[column, numbers] = _cross(spin / self.lever, arms)
             for column, step in self._moves(link, columns, pose):
                 jacobian[column, numbers] = step
-            for column, some, step in self._stretches(joint, link, columns, pose):
-                jacobian[column, some] += step
+            for column, numbers_of_step, step in self._stretches(joint, link, columns, pose):
+                jacobian[column, numbers_of_step] += step
         return jacobian
 
     def _moves(self, link: Link, columns: Floats, pose: Pose) -> Iterator[tuple[int, Floats]]:
@@ -141,16 +141,16 @@ class Targets:
             step = to_world(axes, self.chain.apply_scales(link, link.direction[:, None], columns))
             moved = [*tails.values(), *(self.below[child] for child in self.children[joint])]
             for column in link.lengths:
-                for some in moved:
-                    yield column, some, step
+                for numbers in moved:
+                    yield column, numbers, step
         vectors = [
-            (some, self.chain.apply_lengths(link, link.tails[tail][:, None], columns))
-            for tail, some in tails.items()
+            (numbers, self.chain.apply_lengths(link, link.tails[tail][:, None], columns))
+            for tail, numbers in tails.items()
         ]
         vectors += [(self.below[child], pose.arms[child]) for child in self.children[joint]]
         for component, column in link.scales:
-            for some, vector in vectors:
-                yield column, some, axes[:, component] * (vector[component] / self.lever)
+            for numbers, vector in vectors:
+                yield column, numbers, axes[:, component] * (vector[component] / self.lever)
 
     @staticmethod
     def _targets_by_tail(joint: int, link: Link) -> Iterator[tuple[int, set[JointTarget]]]:
@@ -174,13 +174,13 @@ def unsolved_channels(skeleton: Skeleton) -> tuple[str, ...]:
     return tuple(name for name, unit in pairs if not unit)
 
 
-FARTHER = 0.01  # the weight of targets below the next turning joint, if they count at all
+FARTHER = 0.01  # weight of targets below the next turning joint, if they count
 # ratio of the second singular value to the first: below it targets lie on one line, the roll is
 # open
 LINE = 1e-3
-FAR_LINE = 0.3  # the same if other joints may have bent the targets
+FAR_LINE = 0.3  # ``LINE`` for targets that other joints may have bent
 TO_REST = 1e-6  # keeps channels that no target determines at rest
-LINE_TO_REST = 1e-2  # the same for targets on a line
+LINE_TO_REST = 1e-2  # ``TO_REST`` for targets on a line
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,8 +216,10 @@ class InitialPose:
         below = [int(number) for number in self.targets.below[joint]]
         steps = {number: self._steps(joint, number) for number in below}
         numbers, spread = self._choose_targets(joint, steps, positions - origin)
-        own = [n for n, t in enumerate(self.targets.list) if t.joint == joint and t.axis < 0]
-        at_origin = [n for n in own if self.targets.list[n].tail < 0]
+        own_targets = [
+            n for n, t in enumerate(self.targets.list) if t.joint == joint and t.axis < 0
+        ]
+        at_origin = [n for n in own_targets if self.targets.list[n].tail < 0]
         if not at_origin:
             at_origin = self._at_parents_tail(joint)
         return AttachedTargets(
@@ -235,9 +237,9 @@ class InitialPose:
     ) -> tuple[list[int], bool]:
         """The targets to turn by, and whether they spread to two sides.
 
-        Targets that no other joint bends, unless they all lie at the joint's origin. A root whose
-        own targets are on one line is turned about it by the nearest ones that are not, for it may
-        face anywhere; any other joint stays as near to rest as possible.
+        These are targets that no other joint bends, unless all lie at the joint's origin. A root
+        whose own targets lie on one line may face anywhere: the nearest targets off the line
+        decide. Any other joint stays as near to rest as possible.
         """
         nearest: list[int] = []
         for step in range(max(steps.values(), default=-1) + 1):
@@ -281,9 +283,9 @@ class InitialPose:
         ]
 
     def columns(self, targets: Floats, known: Floats) -> Floats:
-        """Values (n_channels, F) for positions seen, (n_targets, 3, F), where ``known`` is 1.
+        """Values (n_channels, F) for positions ``targets`` (n_targets, 3, F), where ``known`` is 1.
 
-        A joint without a known target keeps the angles of the frame before.
+        A joint without a known target keeps the angles of the previous frame.
         """
         columns = self.targets.neutral(targets.shape[2])
         pose = Pose([], [], [], [])
@@ -304,7 +306,7 @@ class InitialPose:
         known: Floats,
         columns: Floats,
     ) -> None:
-        """Set the joint's angles so that its targets lie in the directions seen."""
+        """Set the joint's angles so that its targets lie in the given directions."""
         body = self.fastened[joint]
         if not link.turns or not len(body.numbers):
             return
@@ -326,7 +328,7 @@ class InitialPose:
         known: Floats,
         weights: Floats,
     ) -> Floats:
-        """Sum of w b a', (3, 3, F): b as seen and a at rest, from the origin or from the mean."""
+        """Sum of w b a', (3, 3, F): b given and a at rest, from the origin or from the mean."""
         body = self.fastened[joint]
         a = np.broadcast_to(body.positions[:, :, None], (*body.positions.shape, weights.shape[1]))
         b = targets[body.numbers]

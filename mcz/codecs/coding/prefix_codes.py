@@ -90,7 +90,7 @@ MAX_INDEX = 1 << 40
 AT, WRITING = 0, 1  # of a coder
 FAULT = -1
 
-# Rows of a table: of each symbol its code and length; of each length its first code, how many
+# Rows of a table: the code and length of each symbol; for each length its first code, how many
 # there are, and where its symbols begin among all in order.
 CODES, LENGTHS, SYMBOLS, FIRSTS, COUNTS, ENTRIES, TABLE_ROWS = range(7)
 

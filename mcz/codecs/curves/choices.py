@@ -1,6 +1,6 @@
 """Encoder decisions of qbc before the first segment.
 
-mcz/codecs/curves/README.md describes it.
+mcz/codecs/curves/README.md describes the encoder.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ MAX_INDEX = 2**40
 LEAST_STEP = 2.0**-100
 LEAST_LEVER = 2.0**-30
 STEP_SHARE = 0.75  # step as a share of the allowed distance, if no decimals are given
-FEWEST_MOST = 512  # greatest distance of marks for the search for the fewest breaks
+MOST_FEWEST_DELTA = 512  # greatest ``delta`` with breaks=fewest, whose search takes long
 
 PRESETS: dict[str, Settings] = {
     "default": {"d2_lmt": 1.0, "delta": 40, "Q": None, "middle": "least-squares"},
     "khan2014": {"d2_lmt": 4.0, "delta": 80, "Q": 2, "middle": "published"},
 }
-MIDDLES = ("published", "least-squares")  # the methods of _qbc_fit, in order of their numbers
+MIDDLES = ("published", "least-squares")  # in the order of their numbers in ``kernels``
 BREAKS = ("split", "fewest")
 
 
@@ -41,14 +41,15 @@ class Plan:
     delta: int
     decimals: int | None
     step: float
-    lever: float  # of a length unit, if steps are scaled: a position counts as value / lever
+    lever: float  # length units of a position that weigh as one angle unit, if steps are scaled
     method: int
-    closed: bool  # the bound applies to decoded points, not to those before rounding
-    fewest: bool
+    is_closed: bool  # the bound applies to decoded points, not to those before rounding
+    has_fewest_breaks: bool
     segment_frames: int  # 0: the size decides
 
     @property
     def grid(self) -> tuple[float, float]:
+        """``per`` and ``step`` of ``kernels.Rule``."""
         return (0.0, self.step) if self.decimals is None else (10.0**self.decimals, 1.0)
 
     def indices(self, points: Floats) -> Ints:
@@ -89,8 +90,8 @@ def plan_of_options(params: Params, layout: Layout) -> Plan:
     if decimals is None and not limit > 0:
         raise OptionError("qbc: with d2_lmt 0 there is no step; give Q")
     fewest = params["breaks"] == "fewest"
-    if fewest and chosen["delta"] > FEWEST_MOST:
-        raise OptionError(f"qbc: breaks=fewest allows delta up to {FEWEST_MOST}")
+    if fewest and chosen["delta"] > MOST_FEWEST_DELTA:
+        raise OptionError(f"qbc: breaks=fewest allows delta up to {MOST_FEWEST_DELTA}")
     step = STEP_SHARE * limit**0.5 if decimals is None else 1.0
     lever = _lever(layout.skeleton) if decimals is None else 1.0
     if step < LEAST_STEP or step * lever < LEAST_STEP:
@@ -98,15 +99,15 @@ def plan_of_options(params: Params, layout: Layout) -> Plan:
             f"qbc: d2_lmt {limit} is too small to derive a step; set the decimals with Q"
         )
     return Plan(
-        limit,
-        chosen["delta"],
-        decimals,
-        step,
-        lever,
-        MIDDLES.index(chosen["middle"]),
-        not published,
-        fewest,
-        segment_frames_of(layout, params["segment_frames"], as_published=published),
+        limit=limit,
+        delta=chosen["delta"],
+        decimals=decimals,
+        step=step,
+        lever=lever,
+        method=MIDDLES.index(chosen["middle"]),
+        is_closed=not published,
+        has_fewest_breaks=fewest,
+        segment_frames=segment_frames_of(layout, params["segment_frames"], as_published=published),
     )
 
 
@@ -118,13 +119,13 @@ def plan_of_header(fields: Any, options: Params) -> Plan:
     if limit is None:
         limit = (fields.step / STEP_SHARE) ** 2 if scaled else preset["d2_lmt"]
     return Plan(
-        limit,
-        fields.delta,
-        None if scaled else fields.decimals,
-        fields.step if scaled else 1.0,
-        fields.position_step / fields.step if scaled else 1.0,
-        MIDDLES.index(options["middle"] or preset["middle"]),
-        options["preset"] != "khan2014",
-        options["breaks"] == "fewest" and fields.delta <= FEWEST_MOST,
-        0,
+        limit=limit,
+        delta=fields.delta,
+        decimals=None if scaled else fields.decimals,
+        step=fields.step if scaled else 1.0,
+        lever=fields.position_step / fields.step if scaled else 1.0,
+        method=MIDDLES.index(options["middle"] or preset["middle"]),
+        is_closed=options["preset"] != "khan2014",
+        has_fewest_breaks=options["breaks"] == "fewest" and fields.delta <= MOST_FEWEST_DELTA,
+        segment_frames=0,
     )

@@ -184,11 +184,11 @@ def marks_of(first: int, stop: int, n_frames: int, delta: int) -> Ints:
 def _joint_streams(points: Floats, marks: Ints, stop: int, plan: Plan) -> tuple[bytes, bytes]:
     """The two streams of a joint; ``marks`` counted from the segment's first frame."""
     points = np.ascontiguousarray(points)
-    rounded = plan.points(plan.indices(points)) if plan.closed else points
-    find = kernels.breaks_of_fewest if plan.fewest else kernels.breaks_by_splitting
+    rounded = plan.points(plan.indices(points)) if plan.is_closed else points
+    find = kernels.breaks_of_fewest if plan.has_fewest_breaks else kernels.breaks_by_splitting
     is_break = np.zeros(len(points), np.bool_)
     is_break[marks] = True
-    rule = kernels.Rule(plan.method, *plan.grid, int(plan.closed))
+    rule = kernels.Rule(plan.method, *plan.grid, int(plan.is_closed))
     find(points, rounded, marks, plan.limit, rule, is_break)
     breaks = np.flatnonzero(is_break)
     middles = np.zeros((len(breaks) - 1, points.shape[1]))

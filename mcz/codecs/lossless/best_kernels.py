@@ -50,7 +50,7 @@ class Regressions(NamedTuple):
     weights: Floats2
     typical: Floats
     work: Floats  # room for the sums while they are solved
-    weighted: Floats  # room for a row of them
+    weighted: Floats  # scratch, one row
     second: Floats
 
 
@@ -151,7 +151,7 @@ def solve(own: Regressions, index: int, ridge: float) -> None:
         weights[i] = total / work[at + i]
 
 
-# A row of references, of one channel: their number, then they.
+# A row has the references of one channel: their number, then the references.
 MOST_REFERENCES, MOST_IN_ALL, COUNT_BITS = 8, 4096, 4
 
 # The regressions of a channel, and the figures of each.

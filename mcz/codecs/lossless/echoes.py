@@ -1,8 +1,8 @@
 """Echoes of best: runs of numbers that repeat earlier ones, of the same channel or another.
 
 Repeated loops have them, and gaits whose halves are mirrored. SPEC.md, "Codec 2: best", is
-normative for their meaning, not for the search. The choice of the channels that predict a channel
-is here too; mcz/codecs/lossless/README.md describes both.
+normative for their meaning, not for the search. It also chooses the channels that predict a
+channel; mcz/codecs/lossless/README.md describes both.
 """
 
 from __future__ import annotations

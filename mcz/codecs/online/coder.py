@@ -84,7 +84,7 @@ class Coder:
         self.space = _space(fields, layout)
         self.at = 0  # number of the frame that is due
         self._ltr: int | None = None  # number of the last LTR, None if unknown
-        self._whole = False  # the frame before is known
+        self._whole = False  # the previous frame is known
         self._state = start_states("online")[N_KINDS * self.coder].copy()
         self._values = np.zeros(len(self.space.weights))
         self._reference = np.zeros(len(self.space.weights))

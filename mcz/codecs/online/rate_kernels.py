@@ -113,7 +113,7 @@ def _steady_step(plan: Floats) -> float:
 def ltr_step(
     plan: Floats, coefficients: Floats, intra: bool, n_frames: int, laplace: Floats
 ) -> float:
-    """log2 of the step of an LTR frame, of a group of ``n_frames``.
+    """log2 of the step of the LTR frame in a group of ``n_frames``.
 
     Under a rate, an intra coded frame, which has no prediction, is never all 0.
     """
@@ -145,7 +145,7 @@ def _ltr_step(
 
 
 def str_step(plan: Floats, n_coefficients: int, n_frames: int, gauss: Floats) -> float:
-    """log2 of the step of an STR frame, of a group of ``n_frames``."""
+    """log2 of the step of the STR frames in a group of ``n_frames``."""
     if plan[MODE] == STEADY:
         plan[BASE] = _steady_step(plan)
     if plan[MODE] == MOD or plan[MODE] == STEADY:

@@ -59,7 +59,7 @@ def next_state(state: int, integer: int) -> int:
 
 
 def twice_value(integer: int, between: int) -> int:
-    """Twice the value, in steps, of an integer; ``between``: 1 where it is of 0 and the halves."""
+    """Twice the value, in steps, of an integer; ``between`` 1: values are 0 and the halves."""
     if between == 0 or integer == 0:
         return 2 * integer
     return 2 * integer - (1 if integer > 0 else -1)  # ROWS-08
@@ -78,7 +78,7 @@ def expect(
     """Complete ``path`` for channel ``c``; return the contexts of its integer.
 
     The channel is ``at_block`` in its block; ``total_usual`` sums the usual magnitudes of those
-    before. ``between``: 1 where integers stand for 0 and the halves.
+    before. ``between`` 1: values are 0 and the halves.
     """
     logs, features, at, usual = model.logs, model.features, model.at, model.features[USUAL]
     weights, own = model.level_weights[level], model.own_weights

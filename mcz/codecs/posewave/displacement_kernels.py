@@ -84,7 +84,7 @@ def code_point(
     target: Floats2,
     radii: Floats,
 ) -> int:
-    """Code the contacts of a point, in place; -1, or the frame where one is impossible.
+    """Code the contacts of a point in place; return -1, or the frame of a fault.
 
     ``places`` (n_frames + 2, 3), the first and the last of them twice, ``target`` (n_frames, 3),
     displacements, and ``radii`` (n_frames,) are in length units. An encoder chooses cheap

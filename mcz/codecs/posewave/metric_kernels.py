@@ -5,8 +5,8 @@ channels above it in its block, and last 1 / root(D): G + regularization = L' D 
 values becomes y = root(D) L x, of which one step is one step of the points' mean squared error.
 
 Poses go through in batches of ``LANES``, see ``pose_kernels``. A single pose has a kernel of its
-own; both give the same bits. A course is the approximations of a segment, row after row, each at
-the pose of the one before.
+own; both give the same bits. A course is the approximations of a segment, row by row, each at the
+pose of the previous one.
 """
 
 from __future__ import annotations
@@ -287,7 +287,7 @@ def continue_course(course: Course, difference: Floats) -> None:
 
 @kernel
 def take_rows(plan: Plan, lanes: Lanes, course: Course, rows: Floats2, approx: Floats2) -> None:
-    """The approximations, (n_rows, n_kept), of rows in the metric."""
+    """Approximations (n_rows, n_kept) from rows in the metric."""
     n_kept = len(course.kept)
     factor, difference = np.empty((1, len(plan.path))), np.empty(n_kept)
     for m in range(len(rows)):

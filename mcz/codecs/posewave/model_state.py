@@ -38,7 +38,7 @@ MAX_EXPONENT = 7
 N_SMALL = C_EXPONENT + (MAX_EXPONENT + 1) * MAX_EXPONENT  # after them are those of the head
 M_FLAG, M_SIGN, N_SMALL_MIXERS = 0, N_LEVELS, 2 * N_LEVELS
 
-# A path through a row, behind the means of a block: magnitudes of four channels, their sum; of a
+# A path through a row, after the means of a block: magnitudes of four channels, their sum; of a
 # channel its mean, two sizes, two features; the cost to an encoder.
 N_STATES = 8  # of dependent quantization
 PATH_SIDE, PATH_TOTAL, PATH_MEAN, PATH_SIZE = BLOCK, BLOCK + 4, BLOCK + 5, BLOCK + 6
@@ -90,10 +90,10 @@ class LevelRows(NamedTuple):
     """The rows of a level: ``q`` (rows, n), twice the values, in steps.
 
     ``y`` (rows, n) is what an encoder quantizes. ``here`` (3 + rows, 2 wide) are magnitudes and
-    values, all of it written by ``code_rows`` but the three rows of zeros in front; ``parent`` and
-    ``grand`` those of the two coarser levels, without their rows of zeros, or one row of zeros.
-    ``exponents`` (rows,) say how much finer than the level's the step of a row is, 2^-s. Rows that
-    are ``is_kept`` (rows,) an encoder does not choose: ``q`` has them.
+    values, which ``code_rows`` writes after three rows of zeros; ``parent`` and ``grand`` those of
+    the two coarser levels, without their rows of zeros, or one row of zeros. ``exponents`` (rows,):
+    the step of a row is that of the level times 2^-s. An encoder does not choose rows that are
+    ``is_kept`` (rows,): ``q`` has them.
     """
 
     q: Ints2

@@ -158,7 +158,7 @@ def _reordered_joint(skeleton: Skeleton, index: int, code: int) -> ReorderedJoin
 
 
 def _build_notes(notes: Ints) -> bytes:
-    """Build the notes: their count, then the distance to the one before and the turns of each."""
+    """Build the notes: their count, then the distance to the previous one and the turns of each."""
     flat = notes.ravel()
     numbers = np.flatnonzero(flat).tolist()
     out = bytearray(varint(len(numbers)))

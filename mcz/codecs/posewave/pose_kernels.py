@@ -17,14 +17,14 @@ from mcz.kernels.types import Floats, Floats2, Floats3
 
 
 class Lanes(NamedTuple):
-    """Room to work on ``width`` poses at a time.
+    """Scratch space for ``width`` poses at a time.
 
     ``sines`` (n_turns, width), angles first; ``cosines``, likewise; ``scratch`` (9, width);
-    ``axes`` (n_joints + 1, 9, width) and ``origins`` (n_joints + 1, 3, width), of which 0 is what
-    roots hang from; ``motions`` (n_kept, 6, width), what one unit of a channel does. Of the metric:
-    ``inertia`` (n_joints, 10, width) and ``force`` (6, width); ``own`` and ``shares``
-    (MAX_PATH, width), entries of G, last 1 / D, and of L, and the same of a second row;
-    ``entries`` (n_entries, width) and ``pivots`` (n_kept * width,).
+    ``axes`` (n_joints + 1, 9, width) and ``origins`` (n_joints + 1, 3, width), index 0 being the
+    parent of roots; ``motions`` (n_kept, 6, width), what one unit of a channel does. Of the metric:
+    ``inertia`` (n_joints, 10, width) and ``force`` (6, width); ``own`` and ``shares`` (MAX_PATH,
+    width), entries of G, last 1 / D, and of L, and the same of a second row; ``entries``
+    (n_entries, width) and ``pivots`` (n_kept * width,).
     """
 
     sines: Floats2
@@ -154,7 +154,7 @@ def _turn(plan: Plan, joint: int, batch: Lanes, lanes: int) -> None:
 
 
 def _turn_about(plan: Plan, turn: int, batch: Lanes, origin: Floats2, lanes: int) -> None:
-    """Turn a joint's axes about one of them, and note the channel's effect."""
+    """Turn a joint's axes about one of them, and store the channel's effect."""
     sines, cosines = batch.sines, batch.cosines
     own, motions = batch.scratch, batch.motions
     axis, number = plan.turns[turn, 0], plan.turns[turn, 2]

@@ -31,7 +31,7 @@ from mcz.codecs.posewave.model_state import (
 )
 from mcz.kernels.types import Floats, Floats2, Ints
 
-MEMORY = 0.996  # what a live row leaves of what earlier ones have taught
+MEMORY = 0.996  # share of what was learned that remains after a live row
 NOISE = 0.1  # variance that each live row adds to that of a channel
 TAP_MEMORY, TAP_RATE, MOST_TAP = 0.98, 0.012, 2.0
 
@@ -92,8 +92,8 @@ def total_of(values: Floats) -> float:
 def spread(means: Floats, column: Floats, miss: float) -> None:
     """Propagate the error of one channel to the means of later channels of a block.
 
-    As in ``take_in``, what comes out for earlier channels is never used: without ends that move the
-    loop is quicker.
+    As in ``take_in``, results for earlier channels are never used: a loop of fixed length is
+    faster.
     """
     for c in range(BLOCK):
         means[c] += column[c] * miss
@@ -102,7 +102,7 @@ def spread(means: Floats, column: Floats, miss: float) -> None:
 def take_in(columns: Floats2, variances: Floats, rest: Floats, size: int, share: float) -> None:
     """Add the temporal error ``rest`` to L D L'; ``columns`` has the columns of L.
 
-    One step of Bennett's update for each channel. ``rest`` is used up.
+    One step of Bennett's update for each channel. Overwrites ``rest``.
     """
     for a in range(size):
         miss, before = rest[a], variances[a] * MEMORY + NOISE
@@ -123,7 +123,9 @@ OF_ROWS = (
 )
 LEAST_SIZE, MOST_SIZE = 0.008, 4096.0
 BASE_SIZE = 0.015
-ONE, TWO, FOUND, SPARE = range(4)  # of ``sizes``: by level, by channel, what they should have been
+ONE, TWO, FOUND, SPARE = range(
+    4
+)  # rows of ``sizes``: predicted by level, by channel, actual, scratch
 LEVEL_RATE, OWN_RATE, CHANNELS = 0.016, 0.032, 62
 USUAL_RATE = 0.06
 
@@ -137,7 +139,7 @@ def log_of(logs: Ints, value: float) -> int:
 def gather_magnitudes(
     model: Model, here: Floats2, parent: Floats2, grand: Floats2, level: int, row: int
 ) -> None:
-    """Fill the features that earlier rows have, and ``sizes`` by them alone."""
+    """Fill the features of earlier rows, and ``sizes`` predicted from them alone."""
     features, n = model.features, len(model.classes)
     one, two = model.sizes[ONE], model.sizes[TWO]
     last = len(parent) - 1

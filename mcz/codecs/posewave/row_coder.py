@@ -13,7 +13,7 @@ import numpy as np
 from mcz.codecs.coding import mixing
 from mcz.codecs.posewave import head_kernels, model_kernels
 from mcz.codecs.posewave.header import NAME, Header
-from mcz.codecs.posewave.model import Start, make_model, new_rows, no_rows, start_coder
+from mcz.codecs.posewave.model import make_model, new_rows, no_rows
 from mcz.codecs.posewave.model_state import N_SMALL, LevelRows
 from mcz.errors import FormatError, MotionError
 from mcz.model.types import Bools, Floats, Ints
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mcz.codecs.posewave.level_coder import CourseMetric
 
 TOO_LARGE = f"{NAME}: a coefficient exceeds 2^29 quantizer steps"
-CARRIED = 40.0  # rows at most that the coarser levels count for
+CARRIED = 40.0  # most rows for which coarser levels count
 
 
 class Stream:
@@ -45,11 +45,6 @@ class Stream:
     def is_whole(self) -> bool:
         """True if every byte was needed, after the last bit was decoded."""
         return bool(mixing.coded_size(self.coder) == len(self.data))
-
-
-def fresh_coder(start: Start) -> Ints:
-    """The coder's state before the first stream of a segment."""
-    return start_coder(start)
 
 
 def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: str) -> None:
@@ -79,7 +74,7 @@ class RowMemory:
         rows.keep(kept, doubles)
 
     def note(self, level: int, exponents: Ints, rows: RowCoder) -> None:
-        """Remember a level; ``exponents`` are those that were asked for."""
+        """Remember a level; ``exponents`` are the requested ones."""
         self._levels[level] = exponents, rows.doubles
 
 
@@ -126,7 +121,7 @@ class RowCoder:
         self._rows.exponents[n_known - 1] = last
 
     def _make_room(self, n_known: int, here: Floats) -> None:
-        """Make room for new rows ``here``, after ``n_known`` ones of the stream before."""
+        """Allocate rows for ``here``, which begins with ``n_known`` rows of the previous stream."""
         self._n_known, n_rows = n_known, len(here) - 3
         self._rows = LevelRows(
             q=np.zeros((n_rows, self.n_kept), np.int64),
@@ -154,7 +149,7 @@ class RowCoder:
         self.doubles[kept] = doubles[kept]
 
     def encode(self, rate_weight: float, rows: Floats) -> Floats:
-        """All rows of coefficients, in steps, as a decoder will have them."""
+        """Encode all rows of coefficients; return them as a decoder will have them, in steps."""
         self._rows.y[self._n_known :] = rows
         if not (np.abs(rows) < model_kernels.MOST_WANTED).all():  # NaN too
             raise MotionError(TOO_LARGE)
@@ -169,9 +164,9 @@ class RowCoder:
         steps: Floats,
         approx: Floats,
     ) -> None:
-        """Approximations, (n_rows, n_kept), one after the other; fills ``approx`` with the decoded.
+        """Code approximations (n_rows, n_kept) row by row; fill ``approx`` with decoded ones.
 
-        ``steps`` (n_rows,) are those of the rows.
+        ``steps`` (n_rows,): the step of each row.
         """
         if not self.n_kept:
             return

@@ -41,7 +41,9 @@ NEVER = 1e300
 HOPELESS = 1.2  # a path worse than the best by so many squared steps is given up
 LEAST = 0.5  # steps: a row of less is all zeros
 MOST_ZEROED = 2.0  # steps: a greater value is never left out
-FROM, TWICE, STILL = range(3)  # of a way: state before, twice the value, 1 for a still channel
+FROM, TWICE, STILL = range(
+    3
+)  # columns of ways: previous state, twice the value, 1 for a still channel
 
 
 def choose_row(
@@ -91,38 +93,40 @@ def search_row(
     """Fill ``q`` with the cheapest values, and return their cost in squares of a step."""
     n, blocks = len(model.classes), len(model.columns)
     n_states = N_STATES if dependent else 1
-    now, then = model.paths[0], model.paths[1]
+    current, following = model.paths[0], model.paths[1]
     for state in range(n_states):
-        now[state, PATH_COST] = NEVER
-    now[0] = 0.0
+        current[state, PATH_COST] = NEVER
+    current[0] = 0.0
     least = total_usual = 0.0
     block, start, stop = -1, 0, 0
     for c in range(n):
         if c == stop:
             block, start, stop = block + 1, stop, (block + 2) * n // blocks
-            forget_block(now)
+            forget_block(current)
         for state in range(n_states):
-            then[state, PATH_COST] = NEVER
+            following[state, PATH_COST] = NEVER
         goal = min(max(y[c], -2.0 * MAX_INDEX), 2.0 * MAX_INDEX)
         for state in range(n_states):
-            path = now[state]
+            path = current[state]
             if path[PATH_COST] <= least + HOPELESS:
-                where = expect(model, path, c, c - start, level, gain, total_usual, state & 1)
-                try_values(model, path, then, model.ways[c], state, goal, lam, where, dependent)
+                contexts = expect(model, path, c, c - start, level, gain, total_usual, state & 1)
+                try_values(
+                    model, path, following, model.ways[c], state, goal, lam, contexts, dependent
+                )
         least = NEVER
         for state in range(n_states):
-            if then[state, PATH_COST] < NEVER:
-                least = min(least, then[state, PATH_COST])
+            if following[state, PATH_COST] < NEVER:
+                least = min(least, following[state, PATH_COST])
                 way = model.ways[c, state]
-                path, value = now[way[FROM]], 0.5 * float(way[TWICE])
+                path, value = current[way[FROM]], 0.5 * float(way[TWICE])
                 miss = (value - path[PATH_MEAN]) / gain
-                follow(path, then[state], model.columns[block, c - start], miss)
-                note_magnitude(then[state], value / gain, miss, way[STILL] == 1)
+                follow(path, following[state], model.columns[block, c - start], miss)
+                note_magnitude(following[state], value / gain, miss, way[STILL] == 1)
         total_usual += model.features[USUAL, c]
-        now, then = then, now
+        current, following = following, current
     state = 0
     for other in range(n_states):
-        if now[other, PATH_COST] < now[state, PATH_COST]:
+        if current[other, PATH_COST] < current[state, PATH_COST]:
             state = other
     for k in range(n):
         way = model.ways[n - 1 - k, state]
@@ -133,28 +137,28 @@ def search_row(
 def try_values(
     model: Model,
     path: Floats,
-    then: Floats2,
+    following: Floats2,
     ways: Ints2,
     state: int,
     goal: float,
     lam: float,
-    where: Contexts,
+    contexts: Contexts,
     dependent: int,
 ) -> None:
-    """Go on from a path with the two values next to ``goal``, and with 0 where it is near."""
+    """Extend a path by each of the two values next to ``goal``, and by 0 if that is near."""
     between = state & 1
-    zero, other = costs_of(model, 0, where)
+    zero, other = costs_of(model, 0, contexts)
     low = int(np.floor(abs(goal) + 0.5)) if between else int(np.floor(goal))
     for k in range(2 if -2 < low < 1 or abs(goal) > MOST_ZEROED else 3):
         integer = low + k if k < 2 else 0
         if between and goal < 0.0:
             integer = -integer
         twice = twice_value(integer, between)
-        away, error = goal - 0.5 * float(twice), integer - where[ROUNDED]
-        bits = zero if error == 0 else other + cost_of_size(model, error, where)
-        cost = path[PATH_COST] + away * away + lam * float(bits) / COST_UNIT
-        to = next_state(state, integer) if dependent else 0
-        if cost < then[to, PATH_COST]:
-            then[to, PATH_COST] = cost
-            ways[to, FROM], ways[to, TWICE] = state, twice
-            ways[to, STILL] = 1 if integer == 0 and error == 0 else 0
+        distance, error = goal - 0.5 * float(twice), integer - contexts[ROUNDED]
+        bits = zero if error == 0 else other + cost_of_size(model, error, contexts)
+        cost = path[PATH_COST] + distance * distance + lam * float(bits) / COST_UNIT
+        next_ = next_state(state, integer) if dependent else 0
+        if cost < following[next_, PATH_COST]:
+            following[next_, PATH_COST] = cost
+            ways[next_, FROM], ways[next_, TWICE] = state, twice
+            ways[next_, STILL] = 1 if integer == 0 and error == 0 else 0

@@ -1,7 +1,7 @@
 """Segments of ``posewave``: streams from frames, and back.
 
 SPEC.md, "Codec 3: posewave", is normative; ``level_coder.py`` goes from level to level. Segments
-without levels may continue the state of the one before: "Segments that go on".
+without levels may continue the previous state: "Segments that go on".
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import numpy as np
 from mcz.codecs.posewave.contacts import ContactTracker, decode_contacts, room_of_contacts
 from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.level_coder import LevelCoder, Pyramid
+from mcz.codecs.posewave.model import start_coder
 from mcz.codecs.posewave.orders import Orders
-from mcz.codecs.posewave.row_coder import RowCoder, RowMemory, Stream, code_head, fresh_coder
+from mcz.codecs.posewave.row_coder import RowCoder, RowMemory, Stream, code_head
 from mcz.codecs.transforms import lifting
 from mcz.errors import FormatError, MotionError
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, ROTATION_KINDS, Skeleton
@@ -97,7 +98,7 @@ def encode_coded(
         details.append(detail)
     bands = [approx, *reversed(details)]
     head = choose_head(header, values, kept, approx)
-    classes, coder = classes_of(skeleton, header.whole), fresh_coder(header.start)
+    classes, coder = classes_of(skeleton, header.whole), start_coder(header.start)
     rows = RowCoder(header, classes, kept, coder, NAME)
     levels = LevelCoder(header, skeleton, pyramid, kept, head.values(header))
     streams = []
@@ -152,7 +153,7 @@ def decode_segment(
     notes, coarsest = orders.read_notes(streams[0], n_frames, where)
     streams = [coarsest, *streams[1 + n_empty :]]
     classes = classes_of(skeleton, header.whole)
-    coder = fresh_coder(header.start)
+    coder = start_coder(header.start)
     stream = Stream(coder, 0, streams[0])
     moving, numbers = np.zeros((2, len(classes)), np.int64)
     code_head(stream, kinds_of(skeleton, header.whole), moving, numbers, where)
@@ -242,7 +243,7 @@ class SegmentChain:
     def decode(self, stream: bytes, n_frames: int, where: str, *, fresh: bool) -> Floats:
         """The values of a segment, (n_frames, n_channels); raises FormatError for bad bytes."""
         if fresh:
-            coding = Stream(fresh_coder(self.header.start), 0, stream)
+            coding = Stream(start_coder(self.header.start), 0, stream)
             kept, numbers = np.zeros((2, len(self._classes)), np.int64)
             code_head(coding, self._kinds, kept, numbers, where)
             level_coder, rows = self._begin(Head(kept == 1, numbers), n_frames, coding)
@@ -266,7 +267,7 @@ class SegmentChain:
         n_frames = len(values)
         if fresh:
             head = choose_head(self.header, values, np.ones(values.shape[1], np.bool_), values)
-            coder = fresh_coder(self.header.start)
+            coder = start_coder(self.header.start)
             coding = Stream(coder, room_of(Pyramid(n_frames, 0, 0), 0, head.moving), None)
             code_head(coding, self._kinds, head.moving.astype(np.int64), head.numbers.copy(), NAME)
             level_coder, rows = self._begin(head, n_frames, coding)

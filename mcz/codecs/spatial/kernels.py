@@ -173,7 +173,7 @@ def code_frames(
     """Code ``indices`` (frames, n_rows) in place; return the frame of a fault, or -1.
 
     ``first``: nothing is known before them. ``lengths`` (n_matrices,) and ``tracks`` (n_rows,
-    TRACK_SIZE) are those of the frame before, and become those of the last.
+    TRACK_SIZE) are those of the previous frame, and become those of the last.
     """
     for at in range(len(indices)):
         begins = first if at == 0 else 0
@@ -186,7 +186,7 @@ def code_frames(
 def add_frames(out: Floats2, values: Floats, indices: Ints2, transform: Transform) -> None:
     """Write frames, (frames, n_channels), from their coefficients (frames, n_rows).
 
-    ``values`` (n_channels,) is the frame before, and becomes the last.
+    ``values`` (n_channels,) is the previous frame, and becomes the last.
     """
     sums = np.empty(transform.vectors.shape[1])
     for at in range(len(out)):

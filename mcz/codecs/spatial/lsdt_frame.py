@@ -95,7 +95,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
 
 
 def _vectors(coder: _Coder, source: SignalSource, length: int) -> Iterator[Ints]:
-    """The coefficients of segments of ``length`` frames, of each matrix (frames, n_vectors)."""
+    """Coefficients of segments of ``length`` frames, as matrices (frames, n_vectors)."""
     reader = FrameReader(NAME, source)
     n_frames = source.layout.n_frames
     for start in range(0, n_frames, length):

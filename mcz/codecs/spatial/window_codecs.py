@@ -4,14 +4,12 @@ SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has the decoder, th
 encoders' choices. Sources:
 
 - ``lsdt-clip``: cosines in time, a learned basis in space. J. Hou, L.-P. Chau, N.
-  Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using learned spatial
-  decorrelation transform, 2016, section 3.2.
-- ``mdtt``: cosines in time, the clip's own basis in space, of low rank. The same authors, Human
-  motion capture data tailored transform coding, 2015, as their paper of 2016 describes it in
-  section 5.4.1.
-- ``pca-rdo``: principal components of poses, and of their courses in windows. L. Vasa, G. Brunnett,
-  Rate-distortion optimized compression of motion capture data, 2014, as Hou 2016 describes it in
-  sections 2.1 and 5.4.2.
+Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using learned spatial decorrelation
+transform, 2016, section 3.2. - ``mdtt``: cosines in time, the clip's own basis in space, of low
+rank. The same authors, Human motion capture data tailored transform coding, 2015, as described in
+their paper of 2016, section 5.4.1. - ``pca-rdo``: principal components of poses, and of their
+courses in windows. L. Vasa, G. Brunnett, Rate-distortion optimized compression of motion capture
+data, 2014, as Hou 2016 describes it in sections 2.1 and 5.4.2.
 
 Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
 states). Windows decode independently; their length is the delay. Means, bases and courses of a clip

@@ -1,4 +1,4 @@
-"""Codec 20, ``lsdt-clip``: windows of frames, transformed in time and space, of all its presets.
+"""Codec 20, ``lsdt-clip``, all presets: windows of frames, transformed in time and space.
 
 SPEC.md, "Codec 20: lsdt-clip", is normative; the names below are its field names.
 """

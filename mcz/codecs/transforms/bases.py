@@ -85,8 +85,8 @@ def truncate(
 
     ``columns`` (J, N) and ``rows`` (N, J) are the same frames m; ``basis`` (J, J) has the basis
     vectors as rows. ``products`` (J, J) becomes the sum over frames of e m^T, e being what is kept
-    of basis @ m. Of equal magnitudes that with the lower index is kept. Returns the sum of the
-    squares of all but the ``n_counted`` largest.
+    of basis @ m. Among equal magnitudes the lower index is kept. Returns the sum of the squares of
+    all but the ``n_counted`` largest.
     """
     n_points, n_frames = columns.shape
     coefficients = np.empty((n_points, BLOCK))

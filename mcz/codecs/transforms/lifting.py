@@ -20,7 +20,7 @@ LOW, HIGH = 1.230174104914001, 1.149604398860241  # of approximations, of detail
 def lift(signal: Floats2, first: int, factor: float) -> None:
     """Add to the rows ``first``, ``first`` + 2, ... ``factor`` times the sum of their neighbors.
 
-    At an end of the signal, of at least two rows, the one neighbor counts twice.
+    At an end of the signal, the only neighbor counts twice. There are at least two rows.
     """
     n_rows, n_channels = signal.shape
     for n in range(first, n_rows, 2):

@@ -157,7 +157,7 @@ def analyze_level(
 ) -> None:
     """Write approximations and details k >= start, (coefficients, channels), of ``n_samples``.
 
-    Both are all zeros before. ``signal`` holds its samples from number ``first`` on, a column a
+    Both are zeros on entry. ``signal`` holds its samples from number ``first`` on, a column a
     channel; beyond both ends of the whole signal it is mirrored about half a sample (PyWavelets'
     mode "symmetric").
     """

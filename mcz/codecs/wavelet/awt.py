@@ -146,7 +146,7 @@ FEWEST_MOVES, MOST_MOVES = 100_000, 20_000_000
 class Choice:
     """The allocation that annealing has found.
 
-    ``kept`` are masks band by band, the coarsest first. Of each channel: ``counts`` of chosen
+    ``kept`` are masks band by band, the coarsest first. By channel: ``counts`` of chosen
     coefficients; ``smallest``, the least magnitude of one, and ``smallest_detail``, infinite
     without any; ``dropped``, the greatest of the others, 0 if there are none; ``greatest`` of all.
     The distortion ``before`` and ``after`` annealing is relative to the greatest coefficient.

@@ -41,8 +41,8 @@ LEAST_RECOVERY = 4  # blocks, so that a small file survives some bad places
 class Shape:
     """Sizes of the protected bytes and of the code, which determine all others.
 
-    The stream is bytes ``start`` to ``start + a_size`` of the file, the end of which the RECV
-    follows, and the ``t_size`` bytes after the RECV.
+    The stream is bytes ``start`` to ``start + a_size`` of the file, up to the RECV, and the
+    ``t_size`` bytes after the RECV.
     """
 
     start: int

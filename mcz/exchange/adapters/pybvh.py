@@ -37,7 +37,7 @@ def from_pybvh(bvh: Bvh, *, unit: str | None = None, up: str | None = None) -> M
     """The motion in a ``pybvh.Bvh``, its numbers unchanged: angles in radians.
 
     The root's positions replace its offset, as in pybvh. ``unit`` ("cm", "m", ...) and ``up`` ("x"
-    to "-z") state facts that it lacks. Raises OptionError for another one.
+    to "-z") state facts that it lacks. Raises OptionError for another object.
     """
     if not hasattr(bvh, "joint_angles"):
         raise OptionError(f"{type(bvh).__name__} is not a pybvh.Bvh; to read a file, use mcz.read")
@@ -134,14 +134,14 @@ class _Tree:
         self.offsets = [self._offset(joint) for joint in range(len(self.joints))]
 
     def depth_first(self) -> Iterator[int]:
-        """The joints in the order of a BVH file, which pybvh writes its columns in."""
-        below, left = self.motion.skeleton.children, [0]
-        while left:
-            yield (joint := left.pop())
-            left += reversed(below[joint])
+        """Yield the joints in the order of a BVH file, that of pybvh's columns."""
+        below, waiting = self.motion.skeleton.children, [0]
+        while waiting:
+            yield (joint := waiting.pop())
+            waiting += reversed(below[joint])
 
     def turns(self, joint: int) -> tuple[list[str], Floats]:
-        """The order of a joint's three angles, and these in radians, (n_frames, 3).
+        """The axes of a joint's three angles, and the angles in radians, (n_frames, 3).
 
         Axes that it does not turn about come last, with zeros.
         """
@@ -170,14 +170,16 @@ class _Tree:
         for number, channel in enumerate(self.joints[joint].channels):
             if channel.kind in POSITION_KINDS:
                 axis = POSITION_KINDS.index(channel.kind)
-                own = self.values[:, self.starts[joint] + number]
+                channel_values = self.values[:, self.starts[joint] + number]
                 positions[:, axis] = (
-                    positions[:, axis] + own if self.joints[joint].adds_to_offset else own
+                    positions[:, axis] + channel_values
+                    if self.joints[joint].adds_to_offset
+                    else channel_values
                 )
         return positions
 
     def _offset(self, joint: int) -> Floats:
-        """A joint's offset; the position that position channels keep it at, if it has some."""
+        """A joint's offset, or its constant position if it has position channels."""
         if joint == 0:
             return np.array(self.joints[0].offset)
         places = self._places(joint)

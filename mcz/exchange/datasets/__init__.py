@@ -1,8 +1,8 @@
 """Data sets: windows of many clips as arrays, for training and statistics.
 
-``dataset`` finds the clips; ``field_table`` has the arrays that are made of them; ``open_files``
-reads the frames, ``feature_blocks`` computes and caches features; ``Dataset`` counts, cuts,
-shuffles and splits.
+``dataset`` finds the clips; ``field_table`` computes arrays from them; ``open_files`` reads the
+frames, ``feature_blocks`` computes and caches features; ``Dataset`` counts, cuts, shuffles and
+splits.
 """
 
 from __future__ import annotations

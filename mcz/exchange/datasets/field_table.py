@@ -198,7 +198,7 @@ def _humanml3d_joints(subject: Subject) -> tuple[int, ...]:
 
 
 def _humanml3d(subject: Subject, rows: SubjectRows) -> Floats:
-    """``mcz.humanml3d``; the last frame repeats the features of the frame before it."""
+    """``mcz.humanml3d``; the last frame repeats the features of the previous one."""
     skeleton = subject.skeleton
     column = _up_column(skeleton)
     joints = _humanml3d_joints(subject)

@@ -67,7 +67,7 @@ def humanml3d(
 
 @check_arguments(features=NUMBERS)
 def humanml3d_positions(features: ArrayLike) -> Floats:
-    """The joint positions that features tell, (n_frames, 22, 3): the inverse of ``humanml3d``.
+    """Joint positions (n_frames, 22, 3) from features: the inverse of ``humanml3d``.
 
     The first frame faces z above the origin. Raises MotionError for another shape.
     """
@@ -182,8 +182,8 @@ def _shortest_turn(start: Floats, ends: Floats) -> Floats:
     zero = np.zeros_like(x)
     spin = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
     turns: Floats = np.eye(3) + spin + spin @ spin * scale[:, None, None]
-    half = np.roll(start, 1)
-    turns[opposite] = 2 * np.outer(half, half) - np.eye(3)
+    axis = np.roll(start, 1)
+    turns[opposite] = 2 * np.outer(axis, axis) - np.eye(3)
     return turns
 
 
@@ -194,10 +194,10 @@ def _with_lengths(places: Floats, lengths: Floats) -> Floats:
             f"bone_lengths must be {len(JOINTS)} lengths, all above 0 except that of the root"
         )
     bones = places - places[:, [max(0, parent) for parent in PARENTS]]
-    own = np.linalg.norm(bones, axis=-1, keepdims=True)
+    own_lengths = np.linalg.norm(bones, axis=-1, keepdims=True)
     leg = [5, 8]
-    out: Floats = places * (lengths[leg].sum() / own[0, leg].sum())
+    out: Floats = places * (lengths[leg].sum() / own_lengths[0, leg].sum())
     for joint in range(1, len(JOINTS)):
-        direction = bones[:, joint] / own[:, joint]
+        direction = bones[:, joint] / own_lengths[:, joint]
         out[:, joint] = out[:, PARENTS[joint]] + direction * lengths[joint]
     return out

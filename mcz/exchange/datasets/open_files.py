@@ -275,7 +275,7 @@ class Member:
     ``target`` is what ``mcz.open`` takes, ``n_source`` its frames at ``source_rate`` frames a
     second (None: unknown) from frame ``first`` on, at ``time`` in seconds (None: unknown);
     ``n_frames`` are those of the data set, at the rate of the data set. ``is_even``: each frame
-    follows the one before by 1 / ``source_rate``; else the times of the clip say when it was.
+    follows the previous one by 1 / ``source_rate``; else the clip has its time.
     """
 
     target: str

@@ -327,7 +327,7 @@ class Dataset:
         return WindowBatchSampler(self, size, seed, workers)
 
     def part(self, members: Sequence[Member]) -> Dataset:
-        """The same of some of its ``members`` alone; files and cache are shared."""
+        """A data set of some of its ``members``; it shares files and cache."""
         part = Dataset(self._settings, members, self._given, blocks=self._blocks)
         part._scales = self._scales
         return part
@@ -340,14 +340,14 @@ class Dataset:
         pattern: str | None = None,
         seed: int = 0,
     ) -> dict[str, Dataset]:
-        """Parts of which no two share a subject: ``split({"train": 0.8, "test": 0.2})``.
+        """Split into parts with distinct subjects: ``split({"train": 0.8, "test": 0.2})``.
 
         ``parts``: names and shares, which add up to 1; by their number of windows parts come as
         near to these as whole subjects allow, each at least one. ``by``: a key of the clips'
-        metadata, or "clip", of which each stands for itself; ``pattern``: a regular expression
-        whose first group, found in the name of a clip, is its subject instead. The same ``seed``
-        splits the same clips in the same way. Raises OptionError if a clip has none, and if
-        there are fewer subjects than parts.
+        metadata, or "clip": each is a subject; ``pattern``: a regular expression whose first group,
+        found in the name of a clip, is its subject instead. The same ``seed`` splits the same clips
+        in the same way. Raises OptionError if a clip has none, and if there are fewer subjects than
+        parts.
         """
         from mcz.exchange.datasets.samplers import split_members
 

@@ -192,10 +192,10 @@ TRIES = 16  # to find the size of an index that contains the size of its own chu
 
 @dataclass(frozen=True, slots=True)
 class Protection:
-    """Strength of recovery data: of ``n_blocks`` blocks any ``n_recovery`` may be bad.
+    """Strength of recovery data: any ``n_recovery`` of ``n_blocks`` blocks may be bad.
 
-    So may a run of ``burst`` bytes anywhere. ``start`` and ``stop``: the protected bytes of the
-    file; ``cost``: size of the recovery data.
+    So may any run of ``burst`` bytes. ``start`` and ``stop``: the protected bytes of the file;
+    ``cost``: size of the recovery data.
     """
 
     start: int

@@ -168,15 +168,14 @@ def append(
 ) -> Report:
     """Add files after the last valid FOOT of an MCZ file, which stays readable throughout.
 
-    Each is stored under its path relative to ``root``, or without one under its name; of a folder
-    every motion file below it, under its path relative to the folder. A file that the target
-    already restores under the same path is left out as "present", another one under a used path is
-    refused, and one whose content is stored under another name becomes an alias. Of an MCZ file all
-    contents are copied without re-encoding; ``rename`` and ``skip_identical`` are as in
-    ``mcz.merge``, ``rate`` and ``force_rate`` as in ``mcz.pack``. If a source cannot be added, none
-    is. Additions to a file with recovery data get their own. ``replace``: a file replaces an older
-    one from the same path, for which the whole archive is rewritten; the metadata of the old clip
-    are kept.
+    Each is stored under its path relative to ``root``, or without one under its name; a folder
+    stands for all motion files below it, with paths relative to it. A file that the target already
+    restores under the same path is left out as "present", another one under a used path is refused,
+    and one whose content is stored under another name becomes an alias. The contents of an MCZ file
+    are copied without re-encoding; ``rename`` and ``skip_identical`` are as in ``mcz.merge``,
+    ``rate`` and ``force_rate`` as in ``mcz.pack``. If a source cannot be added, none is. Additions
+    to a file with recovery data get their own. ``replace``: a file replaces an older one from the
+    same path, for which the whole archive is rewritten; the metadata of the old clip are kept.
 
     A truncated target is continued from its last valid FOOT. Where intact clips follow that,
     ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names them. If its end

@@ -48,8 +48,8 @@ def set_metadata(
 ) -> Report:
     """Set metadata of clips of an MCZ file, or of the file as a whole.
 
-    ``changes``: of each clip by its name, "" for the file, keys of the registry (or ``x-...``) and
-    their values; None removes a key. They are appended (SPEC.md, "META"), so that no byte of a clip
+    ``changes``: by clip name, or "" for the file, keys of the registry (or ``x-...``) and their
+    values; None removes a key. They are appended (SPEC.md, "META"), so that no byte of a clip
     changes, and old values remain in the bytes until the file is rewritten: ``purge`` rewrites it
     without them. Otherwise nothing is written without a change. Raises OptionError for a bad name,
     key or value, and AccessError while another process is appending; ``force`` is as in

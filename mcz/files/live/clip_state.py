@@ -104,7 +104,7 @@ def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
 def begin_clip(
     head: bytes, shared: Shared, row: ClipRow, fields: payloads.Clip
 ) -> ClipState | None:
-    """Return a decoder of the clip that begins; None for a codec that needs all frames.
+    """Return a decoder for a new clip; None for a codec that needs all frames.
 
     ``head`` is HEAD, ``shared`` the chunks before the clip. Raises FormatError for a missing one.
     """

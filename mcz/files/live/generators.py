@@ -41,7 +41,7 @@ Frame = tuple[int, Values, NDArray[np.bool_]]
 
 
 def live_frames(stream: BinaryIO) -> Iterator[Frame]:
-    """The frames of the MCZ file in a binary stream, each as soon as its bytes are there.
+    """Yield the frames of the MCZ file in a binary stream as they arrive.
 
     Yields the number of the frame in its clip, from 0, its values and their validity, both
     (n_channels,) of the motion signal, the values NaN where invalid. A clip whose codec does not
@@ -82,10 +82,10 @@ def stream_encode(
     ``repeat`` and errors: see ``LiveWriter``.
     """
     sink = io.BytesIO()
-    known = skeleton if isinstance(skeleton, Skeleton) else markers(skeleton)
+    resolved = skeleton if isinstance(skeleton, Skeleton) else markers(skeleton)
     writer = LiveWriter(
         sink,
-        with_axes(in_unit(known, unit), up),
+        with_axes(in_unit(resolved, unit), up),
         codec,
         params,
         frame_rate=frame_rate,
@@ -119,10 +119,10 @@ def _drain(sink: io.BytesIO) -> bytes:
 
 
 def markers(names: Sequence[str]) -> Skeleton:
-    """A skeleton of markers of these ``names``, or of those whose coordinates they name.
+    """A skeleton of markers; ``names`` are theirs, or those of their coordinates.
 
-    Coordinates are ``a.x a.y a.z``, or ``a.tx a.ty a.tz``, of each marker in turn. Raises
-    OptionError for no names, an empty one, or coordinates in another order.
+    Coordinates are ``a.x a.y a.z``, or ``a.tx a.ty a.tz``, for each marker. Raises OptionError for
+    no names, an empty one, or coordinates in another order.
     """
     if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
         raise OptionError(f"skeleton is {names!r}; it must be a Skeleton or a list of marker names")
@@ -150,10 +150,10 @@ def stream_decode(
     post_filter: bool = False,
     rate: Fraction | None = None,
 ) -> LiveReader:
-    """The frames of the MCZ file in ``source``, each as soon as its bytes are there.
+    """Iterate over the frames of the MCZ file in ``source`` as they arrive.
 
-    ``source`` is a binary stream, bytes, or an iterable of such. ``lost`` decides about frames that
-    do not come, come damaged, or need such a one: ``refuse`` raises at the first fault, as
+    ``source`` is a binary stream, bytes, or an iterable of bytes. ``lost`` decides about frames
+    that are missing, damaged or depend on such a frame: ``refuse`` raises at the first fault, as
     ``live_frames``; ``missing`` gives NaN, ``hold`` the last decoded values, ``linear`` a straight
     line to the next decoded ones, when these have come. Frames before the first decoded one are
     missing. With ``join`` the stream may begin anywhere, and frames start with the first one whose
@@ -218,26 +218,26 @@ class LiveReader:
             summary.stream_bytes = source.size
 
     def _filter_frames(self) -> Iterator[LiveFrame]:
-        """The frames 12 later, their positions filtered; gaps in their numbers separate them."""
+        """Yield frames with filtered positions, 12 frames late; a gap restarts the filter."""
         waiting: deque[LiveFrame] = deque()
-        stage: PostFilter | None = None
+        post_filter: PostFilter | None = None
         clip: LiveClip | None = None
         try:
             for frame in self._count_frames():
                 follows = waiting and frame.number == waiting[-1].number + 1
-                if stage is None or clip is not self.clip or not follows:
-                    now, self.clip = self.clip, clip or self.clip
-                    yield from _flush(stage, waiting)
-                    self.clip = clip = now
-                    stage = self._stage()
+                if post_filter is None or clip is not self.clip or not follows:
+                    current, self.clip = self.clip, clip or self.clip
+                    yield from _flush(post_filter, waiting)
+                    self.clip = clip = current
+                    post_filter = self._stage()
                 waiting.append(frame)
-                row = stage.push(np.asarray(frame.values, np.float64))
+                row = post_filter.push(np.asarray(frame.values, np.float64))
                 if row is not None:
                     yield _with_values(waiting.popleft(), row)
         except FormatError:
-            yield from _flush(stage, waiting)
+            yield from _flush(post_filter, waiting)
             raise
-        yield from _flush(stage, waiting)
+        yield from _flush(post_filter, waiting)
 
     def _stage(self) -> PostFilter:
         from mcz.files.reading.post_filtering import live_filter
@@ -248,9 +248,9 @@ class LiveReader:
         return live_filter(self.clip.skeleton, rate, self.clip.name)
 
 
-def _flush(stage: PostFilter | None, waiting: deque[LiveFrame]) -> Iterator[LiveFrame]:
-    if stage is not None:
-        for row in stage.finish():
+def _flush(post_filter: PostFilter | None, waiting: deque[LiveFrame]) -> Iterator[LiveFrame]:
+    if post_filter is not None:
+        for row in post_filter.finish():
             yield _with_values(waiting.popleft(), row)
 
 
@@ -291,18 +291,18 @@ class LiveText:
         Raises SourceError for malformed text, for a last line without a line end, and for fewer
         frames than declared; the clip has all frames before that.
         """
-        due, is_renumbered = self._open_source.first_number, False
+        expected, is_renumbered = self._open_source.first_number, False
         for number, values in self._open_source.frames:
-            if number is not None and number != due:
-                if number > due:
-                    self.writer.miss(number - due)
+            if number is not None and number != expected:
+                if number > expected:
+                    self.writer.miss(number - expected)
                 elif not is_renumbered:
-                    remark = f"frame {number} comes where {due} is due; the clip counts on"
+                    remark = f"frame {number} comes where {expected} is due; the clip counts on"
                     self.remarks = (*self.remarks, remark)
                     is_renumbered = True
-                due = number
+                expected = number
             self.writer.push(values)
-            due += 1
+            expected += 1
         declared, n_frames = self._open_source.declared, self.writer.n_frames
         if declared not in (None, n_frames):
             remark = f"{declared} frames are declared, {n_frames} came"
@@ -318,7 +318,7 @@ def begin_live(
     options: SourceOptions,
     encoding: EncodingOptions,
 ) -> LiveText:
-    """A live clip, up to its first frame, of the motion in ``lines``.
+    """Begin a live clip of the motion in ``lines``, up to its first frame.
 
     The caller uses its writer as a context manager. ``source_format`` is ``bvh`` or ``amc``; an AMC
     needs the ``skeleton`` of ``options``, its ASF. Raises SourceError for malformed text, and

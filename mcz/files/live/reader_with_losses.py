@@ -275,8 +275,8 @@ class Concealer:
     """Puts frames in order; ``lost`` chooses the substitutes for missing ones.
 
     ``shown`` are the stored frames that the clip shows, None for all; input counts stored frames,
-    output the shown ones. ``due`` is the stored frame that comes next, None as long as it is
-    unknown. ``spend`` decides whether so many may be concealed.
+    output the shown ones. ``due`` is the next stored frame, None if unknown. ``spend`` decides
+    whether a number of frames may be concealed.
     """
 
     def __init__(

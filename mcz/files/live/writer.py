@@ -53,10 +53,10 @@ Mask = NDArray[np.bool_]
 class LiveTraffic:
     """The bytes of a live clip on the wire.
 
-    ``total`` bytes were sent, ``frames`` of them with frames, ``coded`` of these as streams of the
-    codec: the others are their framing, masks and repeated clip headers. ``asked`` is the last
-    target bit rate of the codec, in kbit/s, None without one; ``seconds`` is the duration of the
-    frames, None if the frame rate is unknown.
+    ``total`` bytes were sent, ``frames`` of them for frames, ``coded`` of these as streams of the
+    codec; the rest is framing, masks and repeated clip headers. ``asked`` is the last target bit
+    rate of the codec, in kbit/s, None without one; ``seconds`` is the duration of the frames, None
+    if the frame rate is unknown.
     """
 
     total: int = 0
@@ -125,7 +125,7 @@ class LiveWriter:
         self._outlet = _Outlet(sink, self.traffic)
         self._writer = Writer(self._outlet)
         self._is_open = self._has_data = self._is_stuck = False
-        self._mask, self._was_masked = b"", False  # of the frame before, and of any in the DATA
+        self._mask, self._was_masked = b"", False  # of the previous frame, and of any in the DATA
         check_metadata(metadata, name)
         self.skeleton, self._n_channels = skeleton, skeleton.n_channels
         self._positions = wants_positions(self.codec, self.options, skeleton)

@@ -351,7 +351,7 @@ class Clip(StoredClip):
         return to_pandas(self.motion(), what, joints=joints, unit=unit, flat=flat)
 
     def contacts(self, joints: Joints = None, rule: ContactRule | None = None) -> Contacts:
-        """In which frames feet stand, of the whole clip: see ``mcz.contacts``."""
+        """Frames of the whole clip in which feet stand, see ``mcz.contacts``."""
         from mcz.kinematics.contacts import RULE, contacts
 
         feet = None if joints is None else joint_list(joints)

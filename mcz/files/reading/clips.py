@@ -269,9 +269,9 @@ def list_some(names: Iterable[str]) -> str:
 class Clips(Mapping[str, Clip]):
     """Clips in file order, found by any name that ``File.only_clip`` accepts.
 
-    A clip is the same object while it is referenced. Of unreferenced clips the last ``KEPT_CLIPS``
-    are kept: a clip keeps the parts that were read, so keeping all clips of an archive would keep
-    the whole archive in memory.
+    A clip is the same object while it is referenced. The last ``KEPT_CLIPS`` unreferenced clips are
+    cached, not all: a clip holds the parts that were read, so all clips could hold the whole
+    archive in memory.
     """
 
     def __init__(self, container: Container) -> None:

@@ -1,7 +1,7 @@
-"""Differences of an output from the source file of its clip, and of two motions.
+"""Differences between an output and the source file of its clip, and between two motions.
 
-Of an output: one word, and notes on its times. Of motions, those other than of values: events,
-parameters, metadata, times.
+An output gets one word, and notes on its times; motions are compared except for their values:
+events, parameters, metadata, times.
 """
 
 from __future__ import annotations

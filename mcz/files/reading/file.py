@@ -204,7 +204,9 @@ class File:
 
     def skeleton(self, id_: bytes, *, with_source: bool = False) -> Skeleton:
         """The skeleton with this id; ``with_source`` also reads the template of its own file."""
-        return (sourced_skeleton if with_source else Container.skeleton)(self.container, id_)
+        return (
+            sourced_skeleton(self.container, id_) if with_source else self.container.skeleton(id_)
+        )
 
     def skeleton_bytes(self, id_: bytes) -> bytes:
         """The skeleton's own source file (ASF), byte for byte."""
@@ -216,7 +218,7 @@ class File:
             )
         try:
             data = FORMATS[source.format].write(skeleton)
-        except MotionError:  # printed again, and the format cannot hold it
+        except MotionError:  # its format cannot hold the stored skeleton
             data = b""
         if data != source.template:
             raise FormatError(f"skeleton {id_.hex()}: its source file describes another skeleton")
@@ -247,8 +249,8 @@ class File:
     def find(self, where: Where) -> list[Clip]:
         """The clips that match ``where``, in file order, perhaps none.
 
-        ``where`` is a function of a Clip or a query, "subject == '05' and n_frames > 500", of
-        docs/reference/queries.md. Raises OptionError for a malformed query, and for a name in it
+        ``where`` is a function of a Clip or a query such as "subject == '05' and n_frames > 500"
+        (docs/reference/queries.md). Raises OptionError for a malformed query, and for a name in it
         that is neither a field nor a metadata key of any clip.
         """
         return list(filter_clips(self, where, self.clips.values()))
@@ -272,7 +274,7 @@ class File:
         return matches
 
     def skeleton_ids(self, clips: Iterable[Clip]) -> set[bytes]:
-        """The ids of the skeletons of these clips, and of the bases of these."""
+        """The ids of the skeletons of ``clips``, and of their bases."""
         ids: set[bytes] = set()
         for clip in clips:
             id_: bytes | None = clip.skeleton_id
@@ -329,7 +331,7 @@ def open_bytes(target: Target) -> ByteSource:
 
 
 def file_of(container: Container) -> File:
-    """The file in ``container``, with the lost skeletons that salvage can make again."""
+    """The file in ``container``, with lost skeletons that salvage can rebuild."""
     if container.salvage:
         restore_skeletons(container)
     return File(container)

@@ -54,8 +54,8 @@ def read(
     ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
     ("x" to "-z"), state facts that the file lacks. ``arrays`` is the meaning of the numbers of a
     plain NPY or NPZ: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw".
-    ``model`` is a model file of SMPL or a related one, with the lengths of bones of such a body in
-    an NPZ ("{gender}" and "{body}" in it: those of the take). Of an MCZ file ``clip`` is read, with
+    ``model`` is a file of SMPL or a related model, with the bone lengths of a body in an NPZ
+    ("{gender}" and "{body}" in it: those of the take). ``clip`` chooses a clip of an MCZ file, with
     ``max_decoded``, ``threads`` and ``verify`` as in ``open``. Raises SourceError, FormatError or
     OptionError.
     """

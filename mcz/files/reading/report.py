@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 def info(file: File, names: Sequence[str] | None = None, where: Where | None = None) -> JsonObject:
     """The document that ``mcz info --json`` prints; its keys are stable.
 
-    ``names``, ``where``: only of these clips, and of their skeletons, see ``File.chosen``.
+    ``names``, ``where``: only these clips and their skeletons, see ``File.select_clips``.
     """
     container, whole = file.container, names is None and where is None
     chosen = file.select_clips(names, where)
@@ -183,7 +183,7 @@ def _exact_joints(clip: Clip, signal: SignalInfo) -> list[str]:
 
 
 def _facts_beside_values(clip: Clip) -> tuple[JsonObject, list[str]]:
-    """Facts in source and signals, each None if its bytes are damaged; and these faults."""
+    """Facts in source and signals, each None if its bytes are damaged; and the faults."""
     facts: JsonObject = {"times": None, "recording": None, "arrays": None}
     unread = []
     for key, read in (("times", _times), ("recording", _recording), ("arrays", _arrays)):
@@ -221,14 +221,14 @@ def exceptions_info(container: Container, clip: Clip) -> JsonObject:
             if not row.header.flags & GROUP_NOTES:
                 continue
             table = container.table(row, signal.counts)
-            signals = [
+            indices = [
                 i
                 for g in range(signal.counts.n_groups)
                 if (i := table.group_notes(g)) is not None and table.lengths[i]
             ]
-            if signals:
-                _, streams = container.streams(row, signal.counts, signals)
-                notes = (parse(GroupNotes, streams[i], "group notes") for i in signals)
+            if indices:
+                _, streams = container.streams(row, signal.counts, indices)
+                notes = (parse(GroupNotes, streams[i], "group notes") for i in indices)
                 n_exceptions += sum(len(one.exceptions) for one in notes)
     share = n_exceptions / n_tokens if n_tokens else 0.0
     return {"n_exceptions": n_exceptions, "exceptions_share": share}
@@ -237,7 +237,7 @@ def exceptions_info(container: Container, clip: Clip) -> JsonObject:
 def source_info(
     path: str | os.PathLike[str], skeleton: str | os.PathLike[str] | None = None
 ) -> JsonObject:
-    """The document that ``mcz info --json`` prints of a source file.
+    """The document that ``mcz info --json`` prints for a source file.
 
     Its keys are those of ``report.info`` that apply without MCZ; ``format`` is the file's.
     ``skeleton`` is the ASF of an AMC. Raises SourceError or OptionError.

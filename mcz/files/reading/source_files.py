@@ -348,9 +348,9 @@ def contradiction(format_name: str, template: bytes, rate: Fraction, step: int) 
 
 @check_arguments(motion=A_MOTION)
 def recording(motion: Motion) -> Recording | None:
-    """The facts that the source of ``motion`` states besides all numbers; None if there are none.
+    """The facts in the source of ``motion`` besides its numbers; None if there are none.
 
-    Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is a clip's.
+    A C3D has events, force platforms, units and descriptions. ``Clip.recording`` is a clip's.
     Raises FormatError on bad bytes.
     """
     source = motion.source

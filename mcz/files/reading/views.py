@@ -104,7 +104,7 @@ class Preview:
 
     @property
     def is_regular(self) -> bool:
-        """True if every frame is ``step`` after the one before."""
+        """True if every frame is ``step`` after the previous one."""
         return bool((np.diff(self.frames) == self.step).all())
 
     def masked(self) -> Values:
@@ -116,7 +116,7 @@ def preview(
 ) -> Preview:
     """The frames that a clip of ``n_frames`` can show without decoding the rest.
 
-    ``reader`` reads the motion signal in its coarsest resolution, of which ``columns`` are kept.
+    ``reader`` reads the motion signal in its coarsest resolution; ``columns`` are kept.
     """
     info = reader.info
     frames, step = _preview_frames(info, n_frames, reader.name)

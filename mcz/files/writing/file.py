@@ -231,8 +231,8 @@ class Written:
     """The result of ``write`` and ``encode``.
 
     ``decoded_bytes``: the least ``max_decoded`` for reading every signal. ``notes``: odd facts of
-    the source file. ``source_bytes``: size of the restored files, of ``encode`` the source and its
-    ASF; 0 without a source. ``inputs``: of ``encode`` these files.
+    the source file. ``source_bytes``: size of the restored files (for ``encode``, the source and
+    its ASF), 0 without a source. ``inputs``: these files, for ``encode``.
     """
 
     size: int

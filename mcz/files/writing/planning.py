@@ -36,8 +36,8 @@ FURTHER_CODEC = "fast"  # of all signals other than the motion, if its codec is 
 class StoredSkeleton:
     """A skeleton that a file stores.
 
-    If it ``derives``, its base is the one before it. ``path`` names its own file, which the MCZ
-    file restores; empty: it restores none.
+    If it ``derives``, its base is the previous one. ``path`` names its own file, which the MCZ file
+    restores; empty: it restores none.
     """
 
     skeleton: Skeleton

@@ -83,7 +83,7 @@ class MemorySource:
     def _block(self, start: int, stop: int) -> Block:
         """Ordinals of a block, exceptions repeating the row before, and its signal with strays.
 
-        Of a lossy codec only its exact channels; others have no strays.
+        A lossy codec has only its exact channels; others have no strays.
         """
         if (start, stop) not in self._settled:
             signal = self.signal.cut(start, stop)

@@ -98,7 +98,7 @@ class Trials:
     def frame_errors(self, target: Target, params: Params) -> Floats:
         """The greatest error of each frame with these parameters, (n_frames,).
 
-        Of positions in cm, unless ``target`` is one of channels.
+        Errors of positions in cm, unless ``target`` is one of channels.
         """
         unit, decoded = self.motion.skeleton.unit_cm, self._decode_trial(self.alone, params)
         if target.weights is not None:

@@ -15,7 +15,7 @@ from mcz.kinematics.metrics.sums import Number, mean_of, scale_figure
 from mcz.model.text_format import fields_text
 from mcz.model.types import Floats
 
-MM = 10.0  # of a cm
+MM = 10.0  # millimeters in a centimeter
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class ContactSlide:
 
 @dataclass(frozen=True, slots=True)
 class Sliding:
-    """All contacts of the original, and the same figures over all of them.
+    """The slides of all contacts of the original, and figures over all of them.
 
     ``where`` is the frame and joint of the greatest difference; ``slides`` are in the order of
     ``contacts.runs``.
@@ -95,7 +95,7 @@ class _ContactDistances:
 def sliding(contacts: Contacts, ours: FootTracks, theirs: FootTracks) -> Sliding:
     """The figures of ``theirs``, the decoded feet, in the ``contacts`` of ``ours``.
 
-    Both have the same joints in length units of the original; ``contacts`` may be of fewer.
+    Both have the same joints, in length units of the original; ``contacts`` may lack some.
     """
     with np.errstate(all="ignore"):  # overflow is no figure
         measured = list(_measure_contacts(contacts, ours, theirs))

@@ -98,7 +98,7 @@ def _euler_angles(quaternions: Floats, order: str) -> Floats:
     computationally efficient method". The second angle is in [0, pi] if the first axis is also
     the last, else in [-pi/2, pi/2]; the others are in [-pi, pi]. In gimbal lock the third is 0.
     """
-    turning = order.isupper()  # about axes that turn along: as about fixed ones, reversed
+    turning = order.isupper()  # intrinsic: extrinsic in reverse order
     i, j, k = ("xyz".index(letter) for letter in (order.lower()[::-1] if turning else order))
     proper = i == k
     k = 3 - i - j if proper else k
@@ -124,7 +124,7 @@ def _euler_angles(quaternions: Floats, order: str) -> Floats:
 def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
     """The inverse of ``from_matrices``: (..., *FORMS[form]) to (..., 3, 3).
 
-    Quaternions may have any length but 0; of 6D vectors the second is made orthogonal to the first.
+    Quaternions may have any length but 0; the second 6D vector is made orthogonal to the first.
     Raises OptionError if the shape does not fit.
     """
     check_form(form)
@@ -136,10 +136,10 @@ def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
         )
     if form == "matrix":
         return array
-    lead = array.shape[: -len(tail)]
+    outer = array.shape[: -len(tail)]
     flat = array.reshape(-1, *tail)
     if form == "6d":
-        return _from_6d(flat).reshape(*lead, 3, 3)
+        return _from_6d(flat).reshape(*outer, 3, 3)
     if form == "euler":
         check_order(order)
     known = np.isfinite(flat).all(axis=1)
@@ -155,11 +155,11 @@ def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
         else:
             turns = _matrices_of_euler_angles(parts, order)
         out[known] = np.moveaxis(turns, 2, 0)
-    return out.reshape(*lead, 3, 3)
+    return out.reshape(*outer, 3, 3)
 
 
 def _matrices_of_euler_angles(angles: Floats, order: str) -> Floats:
-    steps = list(zip(order.lower(), angles, strict=True))  # about fixed axes: as turned, reversed
+    steps = list(zip(order.lower(), angles, strict=True))  # extrinsic: intrinsic in reverse order
     turns = IDENTITY
     for letter, angle in steps if order.isupper() else reversed(steps):
         turns = rotate_axes(turns, "xyz".index(letter), angle)
@@ -204,8 +204,8 @@ def slerp(first: Floats, second: Floats, share: Floats) -> Floats:
     known = np.isfinite(first).all(axis=(1, 2)) & np.isfinite(second).all(axis=(1, 2))
     if known.any():
         start = first[known]
-        way = np.swapaxes(start, 1, 2) @ second[known]
-        vectors = vectors_of_quaternions(quaternions_of_matrices(np.moveaxis(way, 0, 2)))
+        turn = np.swapaxes(start, 1, 2) @ second[known]
+        vectors = vectors_of_quaternions(quaternions_of_matrices(np.moveaxis(turn, 0, 2)))
         part = np.moveaxis(matrices_of_vectors(vectors * share[known]), 2, 0)
         out[known] = start @ part
     return out
@@ -310,7 +310,7 @@ def _plain_names(skeleton: Skeleton | None, own: Sequence[Channel] | None) -> li
 
 
 def _is_unit(four: Floats) -> bool | None:
-    """Return whether all known norms are 1; None without any, or if all rows are the same."""
+    """Return whether all known norms are 1; None if none is known or all rows are equal."""
     norms = np.sqrt((four * four).sum(axis=1))
     known = norms[~np.isnan(norms)]
     if not len(known) or (four == four[:1]).all():
@@ -332,7 +332,7 @@ def slerp_quaternions(first: Floats, last: Floats, share: Floats) -> Floats:
         cosine = (first * last).sum(axis=1, keepdims=True)
         last = np.where(cosine < 0, -last, last)
         angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
-        to, near = share[:, None], angle < 1e-6
-        start = np.where(near, 1 - to, np.sin((1 - to) * angle))
-        mixed = start * first + np.where(near, to, np.sin(to * angle)) * last
+        weight, near = share[:, None], angle < 1e-6
+        start = np.where(near, 1 - weight, np.sin((1 - weight) * angle))
+        mixed = start * first + np.where(near, weight, np.sin(weight * angle)) * last
         return np.asarray(mixed / np.sqrt((mixed * mixed).sum(axis=1, keepdims=True)))

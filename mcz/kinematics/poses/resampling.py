@@ -68,8 +68,8 @@ def resample(
     the names of a quaternion have another norm. ``components``: plain scalars are always splines.
 
     Other signals cannot follow: OptionError unless ``drop_signals``. The result has no source, and
-    the times of the old. Raises OptionError if the times of ``motion`` are unknown, MotionError
-    for a bad ``rate``.
+    keeps the times. Raises OptionError if the times of ``motion`` are unknown, MotionError for a
+    bad ``rate``.
     """
     new_rate = frame_rate_of(rate, motion.name)
     timeline, first = known_timeline(motion.name, motion.timeline), motion.signals[0]

@@ -248,7 +248,7 @@ def accelerations_of(places: Floats, steps: Floats) -> Floats:
 
 
 def _one_sided_slopes(places: Floats, steps: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """The slopes from the frame before and to the next, and the seconds between; NaN: none."""
+    """Slopes from the previous frame and to the next, and the seconds between; NaN: none."""
     seconds = np.full((len(places) + 1, 1, 1), np.nan)
     seconds[1:-1, 0, 0] = steps
     slopes = np.full((len(places) + 1, *places.shape[1:]), np.nan)

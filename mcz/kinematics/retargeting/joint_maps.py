@@ -1,12 +1,12 @@
-"""Matching of joints between skeletons: by names, and by maps of usual skeletons.
+"""Match joints between skeletons, by names and by maps of usual skeletons.
 
 The maps name the part of the body that each joint turns. Parts have the names of SMPL's joints.
 Joints of one part turn alike: rotations of clips that exist as AMC and as BVH were compared.
 ``lwrist``, LeftHand in CMU's BVH files, turns the part of ``left_wrist``; ``abdomen`` of the
 Daz-friendly files turns with ``upperback``.
 
-``{s}``, ``{S}``, ``{side}`` and ``{Side}`` stand for a side: l, L, left, Left and their likes. Of
-several names, divided by a bar, a file has one.
+``{s}``, ``{S}``, ``{side}`` and ``{Side}`` stand for a side: l, L, left, Left and their likes. A
+bar separates alternatives, of which a file has one.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def _joints(known: str | Skeleton) -> dict[str, str]:
 def _recognize_joints(skeleton: Skeleton) -> dict[str, str]:
     """The joints of ``skeleton`` by part, from the usual skeleton that shares most joints with it.
 
-    All of the body's joints are required; fingers, eyes and the like may be missing. Of SMPL's
-    skeletons, which differ in little else, all joints are required.
+    All of the body's joints are required; fingers, eyes and the like may be missing. SMPL's
+    skeletons, which differ in little else, require all joints.
     """
     joint_names = set(skeleton.joint_names)
     best: dict[str, str] = {}
@@ -208,7 +208,7 @@ def _themselves(*parts: str) -> dict[str, tuple[str, ...]]:
     return {part: (part,) for part in parts}
 
 
-# Of each skeleton its joints by part; of several names the most usual first.
+# For each skeleton its joints by part; the most usual of several names comes first.
 SKELETONS = {
     "cmu-amc": _both_sides(CMU_AMC),
     "cmu-bvh": _both_sides(CMU_BVH),

@@ -177,7 +177,7 @@ def _height(skeleton: Skeleton, feet: list[int]) -> float:
     """The height of the joint where the legs part above the feet, with legs straight.
 
     Up is away from the feet in the rest pose; a single leg parts at its root. A leg begins below
-    the first bone with a length; of that bone only its descent counts. The mean of all legs; 0 if
+    the first bone with a length; only the descent of that bone counts. The mean of all legs; 0 if
     there is none.
     """
     if not feet:

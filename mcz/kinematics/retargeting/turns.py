@@ -115,7 +115,7 @@ MOST_NAMED = 6
 def rest_turns(
     target: Skeleton, source: Skeleton, pairs: Mapping[int, int], alike: Iterable[str]
 ) -> dict[int, Floats]:
-    """Turns of each joint of ``pairs``, and of -1, that align its bone with the source's.
+    """Turns that align the bone of each joint of ``pairs`` with the source's; also of -1.
 
     Rotation matrices (3, 3, 1): for joints named in ``alike`` the least such turn, for others the
     turn of the joint above, for -1 none. The bone of a joint leads to the only joint of ``pairs``

@@ -27,7 +27,7 @@ def scaled(mantissa: int, power: int, tens: Floats) -> float:
 def values_of_general(
     ordinals: Ints2, values: Floats2, c: int, start: int, stop: int, rule: Ints, tens: Floats
 ) -> bool:
-    """Numbers of so many significant digits; False if one has too large a power of ten."""
+    """Fill in numbers of a GENERAL grid; return False if a power of ten is too large."""
     low = int(tens[rule[DIGITS] - 1])
     per_class, limit = 9 * low, rule[LIMIT]
     first = NONE  # the least magnitude of the class of the last number
@@ -128,7 +128,7 @@ def ordinals_of_general(
     ordinals: Ints2,
     exact: Bytes2,
 ) -> bool:
-    """Numbers of so many significant digits; False if one needs a closer look."""
+    """Fill in ordinals of a GENERAL grid; return False if a number needs an exact check."""
     low, high = tens[digits - 1], tens[digits]
     power = shift = since = 0  # since: excess of magnitudes over mantissas
     ten = 1.0
@@ -168,7 +168,7 @@ def ordinals_of_fixed(
     ordinals: Ints2,
     exact: Bytes2,
 ) -> bool:
-    """Numbers of so many decimals; False if one is beyond the grid or NaN."""
+    """Fill in ordinals of a FIXED grid; return False for a number beyond it or NaN."""
     ten = tens[rule[POWER]]
     for t in range(start, stop):
         value = values[t, c]

@@ -37,7 +37,7 @@ class Word:
     text: str
     color: str
     size: float
-    side: str = "left"  # of the text at x
+    side: str = "left"  # of the text that is at x
     bold: bool = False
 
 
@@ -203,7 +203,7 @@ THEMES = {
 
 
 def theme_of(name: str) -> Theme:
-    """The theme of that name; OptionError for another."""
+    """The theme called ``name``; raises OptionError for an unknown one."""
     if name not in THEMES:
         raise OptionError(f"theme is {name!r}; it must be one of {', '.join(THEMES)}")
     return THEMES[name]
@@ -254,9 +254,9 @@ class _Video:
 
 
 class _Gif:
-    """One palette for all; of each frame only the part that changed, unchanged pixels transparent.
+    """A GIF with one palette; a frame has the changed part, its unchanged pixels transparent.
 
-    Pillow would keep every frame until the end, so it gets them one at a time.
+    Pillow would keep all frames in memory, so it gets them one by one.
     """
 
     def __init__(self, stream: BinaryIO, fps: Fraction) -> None:
@@ -264,10 +264,9 @@ class _Gif:
         self._gif = import_library("PIL.GifImagePlugin")
         self._stream, self._fps = stream, fps
         self._palette: Any = None
-        self._before: Any = None
-        self._waiting: tuple[Any, tuple[int, int], int] | None = (
-            None  # its duration is unknown until the next one
-        )
+        self._last_indices: Any = None
+        # The last image, its corner and number; its duration is unknown until the next one.
+        self._pending: tuple[Any, tuple[int, int], int] | None = None
         self._count = 0
 
     def add(self, pixels: Pixels) -> None:
@@ -277,19 +276,19 @@ class _Gif:
         indices = np.asarray(image.quantize(palette=self._palette, dither=self._image.Dither.NONE))
         at = self._count
         self._count += 1
-        if self._before is None:
+        if self._last_indices is None:
             self._write_header(indices)
             part, corner = indices, (0, 0)
         else:
-            changed = indices != self._before
+            changed = indices != self._last_indices
             if not changed.any():
-                return  # the frame before is shown longer
+                return  # the previous frame lasts longer
             rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
             box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
             part = np.where(changed[box], indices[box], COLORS).astype(np.uint8)
             corner = int(columns[0]), int(rows[0])
         self._flush(at)
-        self._before, self._waiting = indices, (self._as_image(part), corner, at)
+        self._last_indices, self._pending = indices, (self._as_image(part), corner, at)
 
     def _as_image(self, indices: Any) -> Any:
         image = self._image.fromarray(np.ascontiguousarray(indices, np.uint8))
@@ -301,12 +300,12 @@ class _Gif:
         palette = bytes(self._palette.getpalette("RGB")[: 3 * COLORS]).ljust(3 * 256, b"\0")
         size = width.to_bytes(2, "little") + height.to_bytes(2, "little")
         self._stream.write(b"GIF89a" + size + b"\xf7\0\0" + palette)
-        self._stream.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # again and again
+        self._stream.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # loop forever
 
     def _flush(self, until: int) -> None:
-        if self._waiting is None:
+        if self._pending is None:
             return
-        image, corner, first = self._waiting
+        image, corner, first = self._pending
         ticks = round(until * TICK / self._fps) - round(first * TICK / self._fps)
         options = {"duration": 10 * max(2, ticks), "transparency": COLORS, "disposal": 1}
         for block in self._gif.getdata(image, corner, **options):

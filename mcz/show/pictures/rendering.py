@@ -171,7 +171,7 @@ def film_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: flo
 
 
 def _frames_by_time(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
-    """``film_frames`` by times: across a break in time the frame before stays."""
+    """``film_frames`` by times: across a break in time the previous frame stays."""
     period = timeline.period or 1.0 / USUAL_RATE
     places = np.rint((timeline.regular_times - timeline.regular_times[0]) / period)
     rate, known = Fraction(1 / period).limit_denominator(2**20), timeline.rate

@@ -21,15 +21,13 @@ SPARE = 16  # bytes beyond an end that loops may read, or write unchanged
 
 
 class Codes(NamedTuple):
-    """The codes of a block: ``lengths`` (320,) in bits, ``counts`` (2, 16) of each length,
-    ``symbols`` (2, 320) in the order of their codes, ``bits`` (320,) the codes, first bit lowest;
-    ``order`` (19,) is that of the code lengths in a DYNAMIC block."""
+    """The literal and the distance codes of a block; ``which`` is 0 or 1."""
 
-    lengths: Ints
-    counts: Ints2
-    symbols: Ints2
-    bits: Ints
-    order: Ints
+    lengths: Ints  # (320,), bits of each code
+    counts: Ints2  # (2, 16), codes of each length
+    symbols: Ints2  # (2, 320), in the order of their codes
+    bits: Ints  # (320,), the codes, first bit lowest
+    order: Ints  # (19,), of the code lengths in a DYNAMIC block
 
 
 def read_bits(data: Bytes, at: int, n: int) -> int:
@@ -82,7 +80,7 @@ def read_lengths(data: Bytes, at: int, end: int, codes: Codes) -> int:
     n = 0
     while n < n_literals + n_distances:
         symbol, at = read_symbol(data, at, end, 0, codes)
-        if symbol < 0 or at + 7 > end + 7:
+        if symbol < 0:
             return -1
         repeats = 1
         value = symbol
@@ -135,7 +133,7 @@ def _sort_symbols(lengths: Ints, start: int, n: int, which: int, codes: Codes) -
 
 
 def read_symbol(data: Bytes, at: int, end: int, which: int, codes: Codes) -> tuple[int, int]:
-    """A symbol at bit ``at`` and the bit after it; -1 if no code is."""
+    """Read a symbol at bit ``at``; return it, -1 for a fault, and the bit after it."""
     word = read_bits(data, at, MOST_BITS)
     code = 0
     first = 0
@@ -194,7 +192,7 @@ def sort_codes(codes: Codes) -> bool:
 
 
 def length_base(symbol: int) -> tuple[int, int]:
-    """The least length of a symbol of lengths, and its extra bits."""
+    """The least match length of a symbol, and its extra bits."""
     k = symbol - FIRST_LENGTH
     if k < 8:
         return 3 + k, 0
@@ -205,7 +203,7 @@ def length_base(symbol: int) -> tuple[int, int]:
 
 
 def distance_base(symbol: int) -> tuple[int, int]:
-    """The least distance of a symbol of distances, and its extra bits."""
+    """The least distance of a symbol, and its extra bits."""
     if symbol < 4:
         return 1 + symbol, 0
     extra = (symbol >> 1) - 1

@@ -325,7 +325,7 @@ def _runs(values: Ints) -> list[tuple[int, int]]:
 
 
 def _space_texts(texts: Sequence[tuple[int, bytes]]) -> list[NumberText]:
-    """Texts with the distance of each row to the one before."""
+    """Texts with the distance of each row to the previous one."""
     fields = []
     before = 0
     for row, text in texts:
@@ -378,7 +378,7 @@ def parse_texts(texts: Sequence[NumberText], n_rows: int, where: str) -> list[tu
 
 
 def _rows(distances: Sequence[int], n_rows: int, where: str) -> list[int]:
-    """The rows from their distances, checked: each later than the one before, and below n_rows."""
+    """Ascending rows below ``n_rows`` from their distances; raises FormatError."""
     if 0 in distances[1:] or (distances and sum(distances) >= n_rows):  # AMC-04
         raise FormatError(
             f"rows at distances {distances[:8]} repeat, or exceed the {n_rows} rows", where=where

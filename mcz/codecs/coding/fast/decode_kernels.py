@@ -27,14 +27,14 @@ UNIT_SIZE, WITH_RESTS, MOST_PARTS = 8, 4, 7
 MOST_DROP, MOST_SCALE, MOST_WEIGHT = 32, 120, 32768
 MOST_TOP_10, MOST_TOP_24, MOST_TOP_53 = 614, 255, 2047
 
-# What is wrong: a place in ``FAULTS`` of decoder.py.
+# Faults: indices of ``FAULTS`` in decoder.py.
 ENDS, BAD_KIND, BAD_ORDINAL, BAD_RUNS, BAD_FORM, BAD_TOP, BAD_FIRST, BAD_SCALE = range(8)
 BAD_WEIGHT, BAD_EXCEPTION, BEHIND_HEADS, BAD_LINK, BAD_PARENT, BAD_SOURCE = range(8, 14)
 FAR_PARENTS = 14
 
 
 def scale_of(quarters: int) -> int:
-    """The scale, in sixteenths, that the byte of a head stands for."""
+    """The scale, in sixteenths, that a byte of a head means."""
     return (4 + (quarters & 3) << (quarters >> 2)) >> 2
 
 
@@ -54,6 +54,7 @@ def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
 
 
 def zigzag(data: Bytes, at: int, end: int) -> tuple[int, int]:
+    """A signed varint and the offset after it; -1 if there is none."""
     folded, at = varint(data, at, end)
     return folded >> 1 ^ -(folded & 1), at
 
@@ -66,7 +67,7 @@ def skip_ordinal(data: Bytes, at: int, end: int, size: int) -> int:
 
 
 def skip_runs(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, int]:
-    """The offset after the runs of steps, or -1; and the fault."""
+    """Skip the runs of steps; return the offset after them, or -1, and the fault."""
     n_runs, at = varint(data, at, end)
     left = n_rows
     while n_runs > 0 and at >= 0:
@@ -84,7 +85,7 @@ def skip_runs(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, int]:
 
 
 def skip_exceptions(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, int]:
-    """The offset after exceptions, or -1; and the fault."""
+    """Skip exceptions; return the offset after them, or -1, and the fault."""
     n_exceptions, at = varint(data, at, end)
     row = -1
     while n_exceptions > 0 and at >= 0:
@@ -102,7 +103,7 @@ def skip_exceptions(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, i
 
 
 def set_form(plan: Ints, form: int, drop: int) -> bool:
-    """Note base and digits of a form; False for one that there is not."""
+    """Set base and digits of a form; return False for an unknown form."""
     plan[FORM], plan[DROP] = form, drop
     if (form == 0 and drop <= MOST_DROP) or (MULTIPLES <= form <= COUNTS and drop == 0):
         plan[BASE] = plan[DIGITS] = 0
@@ -116,11 +117,12 @@ def set_form(plan: Ints, form: int, drop: int) -> bool:
 
 
 def most_classes(form: int) -> int:
+    """Greatest class of a form with digits."""
     return MOST_TOP_10 if form < 16 else MOST_TOP_24 if form == 88 else MOST_TOP_53
 
 
 def set_scale(plan: Ints, column: int, byte: int) -> bool:
-    """Note the scale that a byte stands for; False for one that is too large."""
+    """Set the scale that a byte means; return False for one that is too large."""
     if byte > MOST_SCALE:  # FAST-33
         return False
     plan[column] = scale_of(byte)
@@ -128,7 +130,7 @@ def set_scale(plan: Ints, column: int, byte: int) -> bool:
 
 
 def read_form(data: Bytes, at: int, end: int, kind: int, form: int, plan: Ints) -> tuple[int, int]:
-    """Note the form of a coded channel: the offset after its fields, or -1; and the fault."""
+    """Read the form of a coded channel; return the offset after it, or -1, and the fault."""
     drop = 0
     if kind & OWN_FORM:
         if at + 2 > end:
@@ -166,7 +168,7 @@ def read_form(data: Bytes, at: int, end: int, kind: int, form: int, plan: Ints) 
 
 
 def read_predictor(data: Bytes, at: int, end: int, kind: int, plan: Ints) -> tuple[int, int]:
-    """Note first lead, scale and taps: the offset after them, or -1; and the fault."""
+    """Read first lead, scale and taps; return the offset after them, or -1, and the fault."""
     plan[FIRST], at = zigzag(data, at, end)
     if at < 0 or at >= end:
         return -1, ENDS
@@ -193,7 +195,7 @@ def read_predictor(data: Bytes, at: int, end: int, kind: int, plan: Ints) -> tup
 def read_coded(
     data: Bytes, at: int, end: int, kind: int, n_rows: int, form: int, plan: Ints
 ) -> tuple[int, int]:
-    """Note the head of a coded channel: the offset after it, or -1; and the fault."""
+    """Read the head of a coded channel; return the offset after it, or -1, and the fault."""
     at, fault = read_form(data, at, end, kind, form, plan)
     if at >= 0:
         at, fault = read_predictor(data, at, end, kind, plan)
@@ -215,7 +217,7 @@ def read_coded(
 def read_head(
     data: Bytes, at: int, end: int, n_rows: int, form: int, plan: Ints
 ) -> tuple[int, int]:
-    """Note the head of a channel: the offset after it, or -1; and the fault."""
+    """Read the head of a channel; return the offset after it, or -1, and the fault."""
     if at >= end:
         return -1, ENDS
     kind = int(data[at])
@@ -239,7 +241,7 @@ def read_head(
 def read_heads(
     data: Bytes, bounds: Ints, firsts: Ints, n_rows: int, forms: Ints, plans: Ints2, parts: Ints2
 ) -> tuple[int, int]:
-    """Note the heads of streams, and in ``parts`` where residuals and tails of each begin.
+    """Read the heads of streams into ``plans``, offsets of residuals and tails into ``parts``.
 
     ``bounds``: where streams begin in ``data``, and the end of the last; ``firsts``: the first
     channel of each, and the number of all. Returns a channel and its fault, or -1.
@@ -264,7 +266,7 @@ def read_heads(
 
 
 def link_channel(plans: Ints2, firsts: Ints, n: int, at: int) -> int:
-    """Note the parent or the source of channel ``n``, whose group is ``at``; returns the fault."""
+    """Set the parent or the source of channel ``n``, in group ``at``; return the fault, or -1."""
     place = plans[n, PLACE]
     if at < 0 or place >= firsts[at + 1] - firsts[at]:
         return BAD_LINK
@@ -279,23 +281,23 @@ def link_channel(plans: Ints2, firsts: Ints, n: int, at: int) -> int:
 def link(
     plans: Ints2, firsts: Ints, groups: Ints, places: Ints, n_wanted: int, n_whole: int
 ) -> tuple[int, int]:
-    """Note parents and sources; returns a channel and its fault, or -1.
+    """Set parents and sources; return a channel and its fault, or -1.
 
     ``groups``: those whose heads were read; ``places``: where each group of the signal is among
     them, or -1. Sources matter in the first ``n_wanted``, parents in the first ``n_whole``.
     """
     for n_group in range(len(groups)):
-        one = two = -1
+        first_foreign = second_foreign = -1
         for n in range(firsts[n_group], firsts[n_group + 1]):
             plans[n, LINK] = -1
             group = plans[n, GROUP]
             if group < 0:
                 continue
             if plans[n, KIND] == CODED and group != groups[n_group]:
-                if one < 0 or one == group:
-                    one = group
-                elif two < 0 or two == group:
-                    two = group
+                if first_foreign < 0 or first_foreign == group:
+                    first_foreign = group
+                elif second_foreign < 0 or second_foreign == group:
+                    second_foreign = group
                 else:  # FAST-36
                     return n, FAR_PARENTS
             if group >= len(places):  # FAST-27, FAST-34
@@ -311,7 +313,7 @@ def link(
 def fill_lanes(
     plans: Ints2, firsts: Ints, starts: Ints, lanes: Predictors, lattices: Ints2, columns: Ints
 ) -> None:
-    """Number the coded channels, ``columns``, and fill in what their plans say.
+    """Number the coded channels, ``columns``, and fill lanes from their plans.
 
     ``starts``: the first lane of each group, and the number of all.
     """
@@ -343,6 +345,7 @@ SIGN = 1 << 63
 
 
 def short_ordinal(data: Bytes, at: int, size: int) -> int:
+    """The ordinal in ``size`` bytes at ``at``, lowest first, its sign in the lowest bit."""
     folded = 0
     for place in range(size):
         folded |= int(data[at + place]) << 8 * place
@@ -368,6 +371,7 @@ def fill_steps(data: Bytes, at: int, rows: Ints2, n: int) -> None:
 
 
 def put_exceptions(data: Bytes, at: int, rows: Ints2, n: int) -> None:
+    """Write the exceptions at ``at`` into channel ``n``."""
     n_exceptions, at = varint(data, at, len(data))
     row = -1
     for _ in range(n_exceptions):
@@ -381,9 +385,9 @@ def put_exceptions(data: Bytes, at: int, rows: Ints2, n: int) -> None:
 
 @kernel
 def fill_columns(data: Bytes, plans: Ints2, n_wanted: int, rows: Ints2) -> None:
-    """Fill ``rows`` (rows, channels) but for what is coded; copies in the first ``n_wanted``.
+    """Fill ``rows`` (rows, channels) except coded ones, copies only in the first ``n_wanted``.
 
-    ``rows`` may be the first ones of the segment alone. What the heads say was checked.
+    ``rows`` may be only the first ones of the segment. The heads were checked.
     """
     n_rows, n_channels = rows.shape
     for n in range(n_channels):

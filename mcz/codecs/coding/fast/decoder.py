@@ -21,8 +21,8 @@ from mcz.model.types import Ints
 Fetch = Callable[[int], bytes]  # a group -> its stream
 
 MOST_ROWS, MOST_VALUES = 4096, 2**23  # of a segment
-MOST_KNOWN = 64  # requests whose columns are kept
-SPARE = 16  # bytes after the streams within reach of a window
+MOST_KNOWN = 64  # most requests whose columns are cached
+SPARE = 16  # bytes after the streams that a window may read
 FAULTS = (
     "it ends in the head",
     "its kind is unknown",
@@ -52,7 +52,7 @@ class Shape:
         self._known: dict[tuple[int, ...], Columns] = {}
 
     def columns(self, groups: tuple[int, ...]) -> Columns:
-        """The channels of groups, one group after the other; raises FormatError."""
+        """The channels of ``groups``, group by group; raises FormatError."""
         result = self._known.get(groups)
         if result is None:
             if (most := max(groups, default=0)) >= max(1, len(self.groups)):  # FAST-27, FAST-34
@@ -90,20 +90,20 @@ class Columns:
 class Heads:
     """The heads of some groups of a segment, one after the other.
 
-    ``plans``: a row a channel, as in head_kernels; ``parts``: begins of residuals, tails and the
-    rest.
+    ``plans``: a row a channel, as in ``decode_kernels``; ``parts``: for each group the offsets of
+    residuals and tails, and the end.
     """
 
     groups: tuple[int, ...]
     columns: Columns
-    data: bytes  # their streams, and some more
+    data: bytes  # their streams, and ``SPARE`` bytes
     plans: Ints
     parts: Ints
 
     def absent(self, kind: int) -> list[int]:
         """Absent groups with sources of copies or parents of coded channels here."""
-        named = self.plans[self.plans[:, decode_kernels.KIND] == kind, decode_kernels.GROUP]
-        return sorted(set(named[named >= 0].tolist()).difference(self.groups))
+        groups = self.plans[self.plans[:, decode_kernels.KIND] == kind, decode_kernels.GROUP]
+        return sorted(set(groups[groups >= 0].tolist()).difference(self.groups))
 
     def fault(self, channel: int, fault: int) -> FormatError:
         at = int(np.searchsorted(self.columns.firsts, channel, "right")) - 1
@@ -112,7 +112,7 @@ class Heads:
 
 
 def check_size(n_rows: int, n_channels: int, n_frames: int) -> None:
-    """Raise FormatError for a segment that is larger than any."""
+    """Raise FormatError for a segment above the limits."""
     if (n_rows > MOST_ROWS and n_frames > 1) or n_rows * n_channels > MOST_VALUES:
         raise FormatError(
             f"fast: a segment of {n_rows} rows and {n_channels} channels is too large"
@@ -141,9 +141,10 @@ def read_heads(shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int)
 def read_heads_of(
     shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int
 ) -> tuple[Heads, int]:
-    """The heads of groups, then of sources of copies, then of groups with parents.
+    """Read the heads of ``groups``, and of groups that these depend on.
 
-    Also the number of groups before the last.
+    The second are those with sources of copies, then those with parents. Also returns the number of
+    groups without the latter.
     """
     heads = read_heads(shape, groups, fetch, n_rows)
     if len(groups) == len(shape.groups):

@@ -1,7 +1,7 @@
 """The coded channels of segments, decoded by kernels or, if none are compiled, by numpy.
 
-SPEC.md, "Codec 1: fast", is normative. With numpy the streams of several segments are decoded row
-by row together, so that each operation works on all of them.
+SPEC.md, "Codec 1: fast", is normative. numpy decodes the streams of several segments together, row
+by row, so that each operation works on all of them.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ def update_scale(scale: int, residual: int) -> int:
 
 
 def find_steps(column: Words, steps: Words) -> None:
-    """Fill ``steps``, of which the first N_TAPS are none, with the differences of rows."""
+    """Fill ``steps`` from N_TAPS on with the differences of rows."""
     steps[head.N_TAPS] = 0
     for row in range(1, len(column)):
         steps[row + head.N_TAPS] = wrapped(int(column[row]) - int(column[row - 1]))

@@ -116,7 +116,7 @@ def predict(lanes: Predictors, leads: Words2, row: int, residuals: Words, sums: 
 def read_leads(
     data: Bytes, bits: Ints, ends: Ints, starts: Ints, lanes: Predictors, leads: Words2
 ) -> int:
-    """Fill ``leads`` (BEHIND + rows, lanes), of which the first rows are those before the first.
+    """Fill ``leads`` (BEHIND + rows, lanes), whose first rows stand for those before the segment.
 
     ``bits`` and ``ends``: the first bit of each group's residuals and the one after the last.
     ``starts``: the first lane of each group, and the number of all. Returns the row that has no

@@ -35,7 +35,7 @@ from mcz.model.numbers.value_kernels import decimal, magnitude_of
 
 EXACT = 1 << 53  # quotients of floats are exact up to here
 MOST = float(1 << 24)  # units in a value, beyond which none is searched
-PRINTED = 1 << 62  # no ordinal: the decimal of such a product is to be printed
+PRINTED = 1 << 62  # no ordinal: such a product must be printed to find its decimal
 
 
 @kernel
@@ -46,7 +46,7 @@ def fill(
 
     ``tens``: the exact powers of ten; ``powers``: all of them.
     """
-    power = left = 0  # power: of ten, of the number before
+    power = left = 0  # power of ten of the previous number
     for t in range(len(codes)):
         if codes[t] == 0:
             out[t] = 0
@@ -74,10 +74,9 @@ def next_unit(
     powers: Floats,
     digits: int,
 ) -> tuple[int, int]:
-    """The first unit from ``start`` on of which all values are multiples, as their ordinals show.
+    """The first unit from ``start`` on that divides all values; the number of units if none does.
 
-    If there is none: how many units there are. Also how many of the products show nothing, as
-    they are to be printed.
+    Also returns the number of products that decide nothing, since they must be printed.
     """
     for place in range(start, len(units)):
         left = count_open(values, ordinals, units[place], tens, powers, digits)
@@ -238,7 +237,7 @@ def _in_counts(counted: Counted) -> InUnits:
 def parse_mapping(
     stream: bytes, at: int, form: int, grid: Grid
 ) -> tuple[Mapping | None, bool, int]:
-    """The map of coded integers, of whole columns, to ordinals; rests; the offset after both."""
+    """A function from coded integers to ordinals, whether rests follow, the offset after both."""
     if form not in WITH_UNIT:
         return None, False, at
     unit, at = _parse_unit(stream, at)

@@ -216,7 +216,7 @@ class _Document:
     def _accessor(
         self, data: Items, code: int, bounds: bool = False, view: int = 0, **more: object
     ) -> int:
-        """Add rows of numbers to the last buffer view, which is number ``view``."""
+        """Add an accessor of rows of numbers in the last buffer view, number ``view``."""
         start = self.views[view]["byteOffset"]
         entry = {"bufferView": view, "byteOffset": len(self.buffer) - start, "componentType": code}
         entry |= {"count": len(data), "type": TYPES[data.shape[1]], **more}
