@@ -258,8 +258,8 @@ def stream_decode_command(
     The stream is FILE.mcz, or standard input. A line of names comes first. CSV rows begin with the
     number of the frame, counted from 0; an empty field is a missing value. With --float32 a row
     has only values, and NaN is a missing value. At the end standard error reports what arrived.
-    The exit code is 4 if frames are missing, or if the stream was cut off: the source died, the
-    connection broke, or no data arrived for --timeout.
+    The exit code is 4 if frames are concealed or missing, or if the stream was cut off: the source
+    died, the connection broke, or no data arrived for --timeout.
     """
     if connect is not None and file != "-":
         raise Failure("FILE.mcz and --connect exclude each other", Exit.USAGE)
