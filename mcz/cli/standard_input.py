@@ -21,7 +21,7 @@ from mcz.cli.shared_options import literal
 from mcz.cli.terminal import binary_output, echo, plural, say
 from mcz.errors import MczError, OptionError, SourceError
 from mcz.model.motion import Skeleton
-from mcz.model.text_format import cell_text
+from mcz.model.text_format import cell_text, quote
 from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
@@ -276,13 +276,21 @@ class Rows:
 
     def _row(self, cells: Sequence[bytes]) -> NDArray[np.float64]:
         if len(cells) != self._width:
-            raise SourceError(f"line {self._at}: {len(cells)} values of {self._width}")
-        try:
-            if any(b"_" in cell for cell in cells):  # Python accepts an underscore between digits
-                raise ValueError(f"a value with _ in it, among {len(cells)}")
-            return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
-        except ValueError as error:
-            raise SourceError(f"line {self._at}: {error}") from None
+            raise SourceError(f"line {self._at}: {plural(len(cells), 'value')}, {self._needed()}")
+        return np.array([self._number(cell) if cell.strip() else np.nan for cell in cells])
+
+    def _needed(self) -> str:
+        n_names = None if self.names is None else len(self.names)
+        if n_names is None or n_names == self._width:
+            return f"not {self._width}, separated by commas"
+        markers = plural(n_names, "marker")
+        return f"but a row of {markers} has {self._width}: x, y and z of each, separated by commas"
+
+    def _number(self, cell: bytes) -> float:
+        with suppress(ValueError):
+            if b"_" not in cell:  # Python accepts an underscore between digits
+                return float(cell)
+        raise SourceError(f"line {self._at}: {quote(cell.strip())} is not a number")
 
     def _changes(self, text: bytes) -> JsonObject:
         words = tuple(text.decode("utf-8", "replace").split())

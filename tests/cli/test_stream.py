@@ -165,9 +165,10 @@ def test_parameters_change_by_a_line(tmp_path: Path) -> None:
         (b"", "its first line must be names"),
         (b"\n1\n", "need"),
         (b"a\xff,b\n", "not a line of names"),
-        (NAMES + b"1,2\n", "line 2: 2 values of 6"),
-        (NAMES + line(ROWS[0]) + b"1,2,3,4,5,x\n", "line 3"),
-        (NAMES + b"1,2,3,4,5,1_000\n", "line 2: a value with _ in it"),
+        (NAMES + b"1,2\n", "line 2: 2 values, but a row of 2 markers has 6: x, y and z of each"),
+        (b"a.x,a.y,a.z\n1;2;3\n", "line 2: 1 value, not 3, separated by commas"),
+        (NAMES + line(ROWS[0]) + b"1,2,3,4,5,x\n", "line 3: 'x' is not a number"),
+        (NAMES + b"1,2,3,4,5,1_000\n", "line 2: '1_000' is not a number"),
         (b"a.x,a.z,a.y\n", "... must name x, y and z of each marker in turn"),
     ],
 )
