@@ -54,7 +54,7 @@ class Fields(TypedDict, total=False):
 class MczError(Exception):
     """Base of all errors of this package; catching it catches every one of them.
 
-    ``message`` tells what is wrong. The other fields are None where they are not known:
+    ``message`` is the fault alone. The other fields are None while unknown:
 
     ``path``    the file, as the caller named it
     ``clip``    the name of the clip or motion
@@ -139,7 +139,7 @@ class MotionError(MczError):
 
 
 class OptionError(MczError):
-    """A parameter or an argument is unknown or out of its range."""
+    """A parameter or an argument is unknown, out of its range or of a wrong type."""
 
 
 class AccessError(OptionError):
@@ -155,7 +155,7 @@ class OutOfRangeError(OptionError, IndexError):
 
 
 class UnknownNameError(OptionError, KeyError):
-    """A name that means no clip, or several."""
+    """A name that matches no clip, or several."""
 
 
 class SourceError(MczError):
@@ -163,22 +163,22 @@ class SourceError(MczError):
 
 
 class WorkerError(MczError):
-    """A process or a machine that worked for this one ended before it was done."""
+    """A process or a machine that shared the work ended early."""
 
 
 class FormatError(MczError):
     """Bytes that are not a valid MCZ file, chunk or payload.
 
-    ``where`` names a chunk along with its offset, so that the text says ``offset`` no second time.
+    ``where`` names a chunk along with its offset, so that the text does not repeat ``offset``.
     """
 
     _shows_offset = False
 
 
 class TruncatedError(FormatError):
-    """The bytes end before the structure that they began.
+    """The bytes end within a structure.
 
-    ``last_foot`` is the end offset of the last valid FOOT, or None where there is none:
+    ``last_foot`` is the end offset of the last valid FOOT, or None without one:
     everything up to it can be read with ``salvage=True``.
     """
 
@@ -202,7 +202,7 @@ class LimitError(FormatError):
 
 
 class LostFrameError(FormatError):
-    """A live frame that needs one that did not come, or came damaged."""
+    """A live frame needs one that did not arrive, or is damaged."""
 
 
 class SkeletonWarning(UserWarning):
@@ -210,7 +210,7 @@ class SkeletonWarning(UserWarning):
 
 
 class ContactWarning(UserWarning):
-    """A lossy codec could not keep a point in its place as it was asked to."""
+    """A lossy codec could not hold a standing point in its place."""
 
 
 def remark_of(error: MczError | OSError, **fields: Unpack[Fields]) -> Remark:

@@ -103,7 +103,7 @@ class Contacts:
 def contacts(
     motion: Motion, joints: Sequence[int | str] | None = None, rule: ContactRule = RULE
 ) -> Contacts:
-    """In which frames of ``motion`` a foot stands; docs/guides/contacts.md has the rule.
+    """The frames of ``motion`` in which feet stand, by the rule of docs/guides/contacts.md.
 
     ``joints`` are the feet, by index or name; None takes feet by their names, ``LeftFoot``,
     ``ltoes`` and the like. The first point of a joint decides. An up axis or a frame rate that is

@@ -215,7 +215,7 @@ class Skeleton:
     ``unit_cm`` is the length of one unit in centimeters, None while unknown; ``angle_unit`` is
     "deg", "rad" or "" (unknown); ``up_axis`` and ``forward_axis``, if a
     figure faces, are "x", "y", "z", "-x", "-y", "-z" or "" (unknown), not parallel; ``handedness``
-    of the axes is "right", "left" or "" (unknown). Arithmetic takes no notice of these three.
+    of the axes is "right", "left" or "" (unknown). Computations ignore these three.
     ``intrinsic``: the rotation channels of a joint apply about the axes that turn with it, as
     listed (BVH); otherwise about fixed axes (Acclaim).
     ``base`` is the id of the skeleton that this one was derived from.

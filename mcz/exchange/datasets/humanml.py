@@ -11,7 +11,7 @@ the data set (``motion_representation``). Columns, of a frame and the next one:
     193:259    velocities of all joints, by the heading
     259:263    1 if it stands: left ankle, left foot, right ankle, right foot
 
-Velocities are metres a frame. The heading is smoothed; of the first frame it is 0.
+Velocities are meters a frame. The heading is smoothed; of the first frame it is 0.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ def humanml3d(
 ) -> Floats:
     """HumanML3D's features of joint positions, float64 (n_frames - 1, 263).
 
-    ``positions`` (n_frames, 22, 3), in metres, y up, at 20 frames a second: of SMPL's joints in
+    ``positions`` (n_frames, 22, 3), in meters, y up, at 20 frames a second: of SMPL's joints in
     their order, ``pelvis`` to ``right_wrist``. ``bone_lengths`` (22,), of each joint from its
     parent, makes the body that size first, as HumanML3D does with the body of its clip 000021; the
     root moves by the ratio of the legs. A foot stands if it moves less than the root of
-    ``threshold`` in metres, from a frame to the next. If a position is NaN, so is what depends
+    ``threshold`` in meters, from a frame to the next. If a position is NaN, so is what depends
     on it. Raises MotionError for another shape, and OptionError for other lengths.
     """
     places = _check_positions(positions)

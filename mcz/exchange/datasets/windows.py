@@ -52,8 +52,8 @@ class Dataset:
     without a window whole clips. ``data[3:9]`` and ``data[[5, 1]]`` are batches: arrays
     (n, window, ...). The arrays are the caller's own.
 
-    It can be pickled, and each process that a worker is opens the files itself: fork and spawn are
-    both safe. Threads may share it. Reading raises as ``mcz.open`` and ``Clip.read`` do.
+    It can be pickled, and each worker process opens the files itself: fork and spawn are both safe.
+    Threads may share it. Reading raises as ``mcz.open`` and ``Clip.read`` do.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class Dataset:
 
     @property
     def rate(self) -> Fraction | None:
-        """Frames a second, None if the clips do not say it."""
+        """Frames a second, None if the clips do not state it."""
         first = self.members[0].source_rate if self.members else None
         return self._settings.recipe.rate or first
 
@@ -243,7 +243,7 @@ class Dataset:
     def order(self, seed: int, epoch: int = 0) -> NDArray[np.int64]:
         """All windows in an order that follows from ``seed`` and ``epoch`` and is quick to read.
 
-        Neighbouring windows are kept in runs, the runs are shuffled, then the windows of as many
+        Neighboring windows are kept in runs, the runs are shuffled, then the windows of as many
         runs as the cache holds. A data set that fits in the cache is shuffled as a whole.
         """
         pools = self.pools(seed, epoch)

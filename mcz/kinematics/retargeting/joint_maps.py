@@ -26,7 +26,7 @@ LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow")  # parts of a side
 
 
 def joint_map(a: str | Skeleton, b: str | Skeleton) -> dict[str, str]:
-    """From joint names of ``a`` to joint names of ``b`` that turn the same part of the body.
+    """Map joint names of ``a`` to those of ``b`` that turn the same part of the body.
 
     Each is the name of a usual skeleton or a Skeleton with the names of one: "cmu-amc" (also its
     ASF), "cmu-bvh" (cgspeed's MotionBuilder-friendly files), "cmu-bvh-3dsmax", "cmu-bvh-daz",

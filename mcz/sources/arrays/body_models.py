@@ -67,7 +67,7 @@ class FoundOffsets(NamedTuple):
 def offsets_of_model(
     path: str | os.PathLike[str], n_joints: int, betas: ArrayLike | None = None
 ) -> Floats:
-    """From each parent to its joint at rest, (n_joints, 3) in meters; of the root, from the origin.
+    """Rest offsets from each parent to its joint, (n_joints, 3), in meters; of the root from 0.
 
     ``path`` is a model file of SMPL, SMPL-H or SMPL-X: an NPZ with ``kintree_table`` and either
     ``J``, where joints are, or ``J_regressor`` (dense) and ``v_template``. ``betas`` shape the

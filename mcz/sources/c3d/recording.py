@@ -86,7 +86,7 @@ class Recording:
     "" if unknown; ``analog_rate`` is in samples a second, None if unknown. ``general_scale`` is
     part of what every analog word means. ``x_screen`` and ``y_screen`` are the axes that point
     right and up on a screen, as printed ("+X", "-Z"), "" if unknown. ``zero_frames`` are the
-    frames, from 1 on, in which no platform is loaded, None if the file does not say so.
+    frames, from 1 on, in which no platform is loaded, None if the file does not state it.
     """
 
     first_frame: int

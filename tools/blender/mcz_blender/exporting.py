@@ -39,16 +39,18 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
     filename_ext = ".mcz"
     filter_glob: StringProperty(default="*.mcz", options={"HIDDEN"})
     adds: BoolProperty(
-        name="Add to Archive", description="Add to the file, if it is there, in place of a new one"
+        name="Add to Archive", description="Add to an existing file instead of replacing it"
     )
-    clip_name: StringProperty(name="Clip Name", description="Of one clip; otherwise its own name")
+    clip_name: StringProperty(
+        name="Clip Name", description="Name of a single clip; several keep their names"
+    )
     codec: EnumProperty(name="Codec", items=CODECS, default="fast")
     max_error_cm: FloatProperty(
-        name="Greatest Error", min=0.001, default=0.5, description="In cm, of a lossy file"
+        name="Greatest Error", min=0.001, default=0.5, description="In cm, for a lossy file"
     )
     angle_decimals: IntProperty(name="Decimals of Degrees", min=0, max=9, default=4)
     length_decimals: IntProperty(
-        name="Decimals of Lengths", min=-1, max=9, default=-1, description="-1: to a micrometer"
+        name="Decimals of Lengths", min=-1, max=9, default=-1, description="-1: a micrometer"
     )
     unit: EnumProperty(
         name="Unit", items=[(KEEP, "Keep", "As imported, otherwise cm"), *UNITS], default=KEEP

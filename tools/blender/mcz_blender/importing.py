@@ -53,36 +53,44 @@ class ImportMCZ(bpy.types.Operator, ImportHelper):
     )
     clip: StringProperty(
         name="Clip",
-        description="The clip of an archive: type words of its name or metadata, or a query",
+        description="A clip of an archive: type words of its name or metadata, or a query",
         search=clips_like,
         options={"SKIP_SAVE"},
     )
     where: StringProperty(
         name="Query",
-        description="Every clip that it takes, such as: n_frames > 500 and name like 'walk*'",
+        description="Import every clip that matches: n_frames > 500 and name like 'walk*'",
         options={"SKIP_SAVE"},
     )
-    every_clip: BoolProperty(name="All Clips", description="Every clip of an archive")
+    every_clip: BoolProperty(name="All Clips", description="Import every clip of an archive")
     first: IntProperty(name="First Frame", min=0, description="Counted from 0")
     stop: IntProperty(name="Stop", min=0, description="The frame after the last; 0: to the end")
     step: IntProperty(name="Step", min=1, default=1, description="Every n-th frame")
     resolution: IntProperty(
-        name="Coarser", min=0, max=16, description="How many of the finest details are left out"
+        name="Coarser", min=0, max=16, description="Number of the finest resolutions to leave out"
     )
     skeleton: StringProperty(
-        name="ASF", subtype="FILE_PATH", description="The skeleton of an AMC, if not beside it"
+        name="ASF",
+        subtype="FILE_PATH",
+        description="The skeleton of an AMC, if it is not beside the AMC",
     )
     salvage: BoolProperty(
-        name="Salvage", description="Read what a damaged file still holds, and say what is lost"
+        name="Salvage", description="Read the intact parts of a damaged file, and report the losses"
     )
-    unit: EnumProperty(name="Unit", items=UNITS, default="cm", description="Where unknown")
-    up: EnumProperty(name="Up", items=AXES, default="y", description="Where unknown")
-    rate: FloatProperty(name="Rate", min=0.001, default=120.0, description="Where unknown")
-    start: IntProperty(name="Start at", default=1, description="The scene's frame of the first")
+    unit: EnumProperty(
+        name="Unit", items=UNITS, default="cm", description="If the file states none"
+    )
+    up: EnumProperty(name="Up", items=AXES, default="y", description="If the file states none")
+    rate: FloatProperty(
+        name="Rate", min=0.001, default=120.0, description="If the file states none"
+    )
+    start: IntProperty(
+        name="Start at", default=1, description="The scene's frame for the first frame"
+    )
     sets_rate: BoolProperty(
         name="Set Frame Rate",
         default=True,
-        description="The scene gets the clip's rate; otherwise keys lie where they are in time",
+        description="Give the scene the clip's rate; otherwise keys may lie between frames",
     )
     sets_range: BoolProperty(name="Set Range", default=True)
 
