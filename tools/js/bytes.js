@@ -141,7 +141,7 @@ export class ByteReader {
       value += (byte & 127) * factor;
       if (value > MAX_COUNT) this.refuse("a varint is beyond 2^53 - 1");
       if (byte < 128) {
-        if (byte === 0 && factor > 1) this.refuse("a varint is longer than it needs to be");
+        if (byte === 0 && factor > 1) this.refuse("a varint is not in its shortest form");
         return value;
       }
       factor *= 128;
@@ -184,7 +184,7 @@ export class ByteReader {
    */
   counted(read) {
     const n = this.varint();
-    if (n > this.left) this.refuse(`a list of ${n} in ${this.left} bytes`);
+    if (n > this.left) this.refuse(`a list of ${n} does not fit ${this.left} bytes`);
     const list = [];
     for (let i = 0; i < n; i++) list.push(read(this, i));
     return list;
@@ -199,7 +199,7 @@ export class ByteReader {
    */
   optional(read) {
     const n = this.varint();
-    if (n > 1) this.refuse(`${n} of what is there at most once`);
+    if (n > 1) this.refuse(`an optional field occurs ${n} times`);
     return n === 1 ? read(this) : null;
   }
 
@@ -217,6 +217,6 @@ export class ByteReader {
 
   /** The end of a closed structure. */
   end() {
-    if (this.at !== this.stop) this.refuse(`${this.left} bytes too many`);
+    if (this.at !== this.stop) this.refuse(`${this.left} bytes follow its end`);
   }
 }

@@ -33,7 +33,7 @@ export function readClipEnd(payload, clip, salvage = false) {
   if (missing.length > 0 && !clip.open) reader.refuse("missing frames of a clip that is not open");
   if (!salvage) checkFrames(reader, nFrames, clip);
   if ((sourceSha256 !== null) !== (clip.source !== null)) {
-    reader.refuse("the hash of a source, or none, where CLIP says otherwise");
+    reader.refuse("a source and its hash must be given together");
   }
   if (valueSha256.length !== clip.signals.length) {
     reader.refuse(`${valueSha256.length} hashes of ${clip.signals.length} signals`);

@@ -75,22 +75,22 @@ export function readClip(payload, offset, file) {
   if (file.head) checkNeeds(payload, file.head);
   readNeeds(reader);
   const name = reader.text();
-  if (name === "") reader.refuse("a clip without a name");
-  if (file.clips.has(name)) reader.refuse(`a second clip ${name}`);
+  if (name === "") reader.refuse("the clip has no name");
+  if (file.clips.has(name)) reader.refuse(`a second clip is named ${name}`);
   reader.what = `CLIP ${name}`;
   const flags = reader.flags(FLAG_OPEN | FLAG_ROUNDED_RATE | FLAG_TIME_BASE);
   const open = (flags & FLAG_OPEN) !== 0;
   const skeleton = file.skeletons.get(hex(reader.take(ID_SIZE)));
   if (!skeleton) reader.refuse("its SKEL does not come before it");
   const nFrames = reader.varint();
-  if (open && nFrames !== 0) reader.refuse(`an open clip of ${nFrames} frames`);
+  if (open && nFrames !== 0) reader.refuse(`an open clip states ${nFrames} frames`);
   const frameRate = { numerator: reader.varint(), denominator: reader.varint() };
-  if (frameRate.denominator === 0) reader.refuse("a frame rate over 0");
+  if (frameRate.denominator === 0) reader.refuse("the denominator of the frame rate is 0");
   const timeBase = flags & FLAG_TIME_BASE ? readTimeBase(reader, open) : null;
   const metadata = readMetadata(reader);
   const source = reader.optional(() => readClipSource(reader, file));
   const signals = reader.counted((_, index) => readSignal(reader, index, skeleton, file.limits));
-  if (signals.length === 0) reader.refuse("a clip without a signal");
+  if (signals.length === 0) reader.refuse("the clip has no signal");
   within(signals.length, file.limits.signals, "signals of a clip");
   if (file.limits.plain) signals.forEach(checkPlainSignal);
   checkRoles(reader, signals, timeBase);
@@ -145,17 +145,17 @@ function readClipSource(reader, file) {
 
 function checkRoles(reader, signals, timeBase) {
   if (signals.slice(1).some(({ role }) => role === MOTION)) {
-    reader.refuse("a motion that is not the first signal");
+    reader.refuse("only the first signal can be a motion");
   }
   const times = signals.filter(({ role }) => role === TIMES);
-  if (times.length > 1) reader.refuse("two signals of times");
+  if (times.length > 1) reader.refuse("more than one signal of times");
   if (times.length > 0 && (timeBase?.firstTime ?? null) !== null) {
-    reader.refuse("the time of the first frame beside a signal of times");
+    reader.refuse("both the time of the first frame and a signal of times are given");
   }
   for (const { channels, ownChannels, samplesPerFrame } of times) {
     const isPlain = ownChannels && samplesPerFrame === 1 && channels.length === 1;
     if (!isPlain || !isScalar(channels[0]) || !TIMES_PER_SECOND.has(channels[0].unit)) {
-      reader.refuse("times that are not one plain scalar a frame in units of time");
+      reader.refuse("times must be one plain scalar a frame, in a unit of time");
     }
   }
   for (const { index, of } of signals) {
@@ -176,7 +176,7 @@ function readSignal(reader, index, skeleton, limits) {
     : skeleton.channels;
   within(channels.length, limits.channels, "channels of a signal");
   const samplesPerFrame = reader.varint();
-  if (samplesPerFrame === 0) reader.refuse("no rows a frame");
+  if (samplesPerFrame === 0) reader.refuse("a frame has no rows");
   const skip = reader.varint();
   const spare = reader.varint();
   const gridRuns = readGrids(reader, channels.length);
@@ -186,7 +186,7 @@ function readSignal(reader, index, skeleton, limits) {
   const header = reader.sized();
   const groupSizes = readGroups(reader, channels, ownChannels);
   const nResolutions = reader.u8();
-  if (nResolutions === 0) reader.refuse("no resolutions");
+  if (nResolutions === 0) reader.refuse("the signal has no resolutions");
   reader.extension(flags);
   return {
     name,
@@ -216,7 +216,7 @@ function readGrids(reader, total) {
   const runs = reader.counted(() => {
     const nChannels = reader.varint();
     const grid = parseGrid(reader);
-    if (nChannels === 0) reader.refuse("a run of grids for no channel");
+    if (nChannels === 0) reader.refuse("a run of grids has no channel");
     found += nChannels;
     if (found > total) reader.refuse(`grids of more than ${total} channels`);
     return { nChannels, grid };
@@ -232,7 +232,7 @@ function readGroups(reader, channels, ownChannels) {
     case GROUPS_ALL:
       return channels.length > 0 ? [channels.length] : [];
     case GROUPS_PER_JOINT:
-      if (ownChannels) reader.refuse("groups per joint of channels without joints");
+      if (ownChannels) reader.refuse("channels are grouped by joint, but belong to no joints");
       return sizesByJoint(channels);
     case GROUPS_PER_CHANNEL:
       return sizesByChannel(channels);
@@ -263,7 +263,7 @@ function listedSizes(reader, total) {
   let found = 0;
   const sizes = reader.counted(() => {
     const size = reader.varint();
-    if (size === 0) reader.refuse("a group of no channels");
+    if (size === 0) reader.refuse("a group has no channels");
     found += size;
     if (found > total) reader.refuse(`groups of more than ${total} channels`);
     return size;

@@ -143,7 +143,7 @@ function checkSegment(segment, signal, limits) {
   const what = `segment at frame ${firstFrame} of ${signal.name}`;
   if (nFrames === 0) throw new Refused(`${what}: no frames`);
   const isDue = firstFrame === signal.due || (signal.mayLack && firstFrame > signal.due);
-  if (!isDue) throw new Refused(`${what}: frame ${signal.due} is due`);
+  if (!isDue) throw new Refused(`${what}: the segment must begin with frame ${signal.due}`);
   if (lead > firstFrame) throw new Refused(`${what}: a lead of ${lead}`);
   if (firstFrame === 0 && !segment.fresh) throw new Refused(`${what}: it does not start fresh`);
   count(firstFrame + nFrames + tail, `${what}: its end`);

@@ -66,7 +66,7 @@ class RemoteFile {
       const said = CONTENT_RANGE.exec(response.headers.get("Content-Range") ?? "");
       if (said && Number(said[3]) !== this.size) this.refuse(REPLACED);
       if (said && (Number(said[1]) !== start || Number(said[2]) !== stop - 1)) {
-        this.refuse(`bytes ${start} to ${stop - 1} are asked for, it gives ${said[0]}`);
+        this.refuse(`the server sent ${said[0]} for bytes ${start} to ${stop - 1}`);
       }
       return this.body(response, stop - start);
     });
@@ -88,7 +88,7 @@ class RemoteFile {
       const size = said ? Number(said[3]) : await this.sizeByHead();
       const most = Math.min(size, TAIL);
       if (said && (Number(said[1]) !== size - most || Number(said[2]) !== size - 1)) {
-        this.refuse(`the last ${most} bytes are asked for, it gives ${said[0]}`);
+        this.refuse(`the server sent ${said[0]} for the last ${most} bytes`);
       }
       const tail = await this.body(response, most);
       this.size = size;
@@ -107,7 +107,7 @@ class RemoteFile {
     const response = await this.request(null, false, "HEAD");
     if (!response.ok) this.unexpected(response);
     const length = response.headers.get("Content-Length");
-    if (length === null) this.refuse("the server does not say how long the file is");
+    if (length === null) this.refuse("the server does not state the size of the file");
     return Number(length);
   }
 
@@ -166,7 +166,7 @@ class RemoteFile {
       throw this.passing(error);
     }
     this.stats.bytes += bytes.length;
-    if (bytes.length > size) this.refuse(`${size} bytes are asked for, ${bytes.length} came`);
+    if (bytes.length > size) this.refuse(`${bytes.length} bytes arrived instead of ${size}`);
     const message = `${bytes.length} of ${size} bytes came`;
     if (bytes.length < size) throw this.passing({ message });
     return bytes;

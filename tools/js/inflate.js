@@ -52,7 +52,7 @@ class Huffman {
     }
     // A code of one symbol may be incomplete, of one bit, and one of none stand unused.
     const mayLack = !whole && used <= 1 && counts[1] === used;
-    if (free > 0 && !mayLack) inflater.refuse("a code is not whole");
+    if (free > 0 && !mayLack) inflater.refuse("a code is incomplete");
     this.bits = used === 0 ? 0 : counts.findLastIndex((n, length) => length > 0 && n > 0);
     this.table = new Uint16Array(1 << this.bits);
     lengths.forEach((length, symbol) => {
@@ -120,7 +120,7 @@ class Inflater {
   symbol(code) {
     this.fill(code.bits);
     const entry = code.table[this.bitBuffer & (code.table.length - 1)];
-    if (entry === 0) this.refuse("bits that are no code");
+    if (entry === 0) this.refuse("some bits are not a code");
     this.drop(entry & 15);
     return entry >> 4;
   }
@@ -171,7 +171,7 @@ class Inflater {
       all.fill(value, i, i + n);
       i += n;
     }
-    if (all[END_OF_BLOCK] === 0) this.refuse("a block without an end");
+    if (all[END_OF_BLOCK] === 0) this.refuse("a block has no end");
     return [
       new Huffman(all.subarray(0, nLiterals), this),
       new Huffman(all.subarray(nLiterals), this),
@@ -211,7 +211,7 @@ class Inflater {
       if (kind === 0) this.stored();
       else if (kind === 1) this.block(...FIXED_CODES);
       else if (kind === 2) this.block(...this.codes());
-      else this.refuse("a block of kind 3");
+      else this.refuse("kind 3 of a block is reserved");
     }
     this.align();
     if (this.at !== this.data.length) this.refuse("bytes follow the stream");

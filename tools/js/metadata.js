@@ -46,7 +46,7 @@ function readRecord(reader) {
 }
 
 function checked(reader, key) {
-  if (INTERPRETED.has(key)) reader.refuse(`${key} is not to be said behind a clip`);
+  if (INTERPRETED.has(key)) reader.refuse(`${key} must not follow a clip`);
   return key;
 }
 

@@ -85,7 +85,7 @@ export class Packets {
     }
     const sequence = reader.varint();
     const length = reader.varint();
-    if (sequence !== this.sequence) reader.refuse(`packet ${sequence}, ${this.sequence} is due`);
+    if (sequence !== this.sequence) reader.refuse(`packet ${sequence} where packet ${this.sequence} is expected`);
     within(length, this.limits.packetBytes, "bytes of a packet's body");
     const head = reader.bytes.subarray(start, reader.at);
     const body = reader.take(length);
@@ -93,7 +93,7 @@ export class Packets {
     let mask = null;
     let implied = NOTHING;
     if (kind === KIND_FRAME) {
-      if (number === null) reader.refuse("a frame before a segment of signal 0 said which is due");
+      if (number === null) reader.refuse("no packet before it states its frame");
       mask = impliedMask(this.told);
       implied = impliedBy(number, mask);
     }
@@ -133,14 +133,14 @@ export class Packets {
   next(reader, base, clip) {
     const { kind, fresh, body, number, mask } = this.read(reader);
     if (kind === KIND_END) {
-      if (body.length !== 0) reader.refuse("an end packet with a body");
+      if (body.length !== 0) reader.refuse("the end packet must be empty");
       return null;
     }
     const offset = base + reader.at - CHECK_SIZE - body.length;
     let segment;
     if (kind === KIND_SEGMENT) {
       segment = readSegment(body, clip, this.limits);
-      if (segment.fresh !== fresh) reader.refuse("packet and segment differ on freshness");
+      if (segment.fresh !== fresh) reader.refuse("packet and segment disagree whether it starts fresh");
     } else {
       segment = frameSegment({ body, fresh, number, mask }, clip.signals[0], this.limits);
     }
@@ -188,7 +188,7 @@ export function indexedBody(bytes, { packet, offset, size, firstFrame, fresh }, 
   for (const head of headsIn(bytes.subarray(0, begin), kind, size)) {
     if (checkOf(head, implied, body) === check) return body;
   }
-  return reader.refuse("its crc is wrong, or it is not as the index says");
+  return reader.refuse("its crc is wrong, or it differs from the index");
 }
 
 /** The heads of such a packet that some bytes end with, whatever its number in its DATA. */

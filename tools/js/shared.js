@@ -97,7 +97,7 @@ export class Attachment {
   add(payload) {
     const part = readPart(payload);
     if (part.part !== this.parts.length) {
-      this.refuse(`part ${part.part} where ${this.parts.length} is due`);
+      this.refuse(`part ${part.part} where part ${this.parts.length} is expected`);
     }
     if (!this.hasPart(part)) this.refuse("its parts do not agree");
     within(this.found + part.partSize, this.limit, `bytes of attachment ${this.name}`);
@@ -147,7 +147,7 @@ function readPart(payload) {
   const partSize = reader.varint();
   reader.extension(flags);
   const data = reader.rest();
-  if (nParts < 1) reader.refuse("a file of no parts");
+  if (nParts < 1) reader.refuse("a file has no parts");
   return { name, part, nParts, size, sha256, flags, partSize, data };
 }
 

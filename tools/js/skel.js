@@ -67,7 +67,7 @@ export function readSkeleton(payload, id, file) {
   const name = reader.text();
   const intrinsic = (reader.flags(FLAG_INTRINSIC) & FLAG_INTRINSIC) !== 0;
   const unitCm = reader.optional(() => reader.f64());
-  if (unitCm !== null && !(unitCm > 0 && unitCm < Infinity)) reader.refuse(`unit_cm is ${unitCm}`);
+  if (unitCm !== null && !(unitCm > 0 && unitCm < Infinity)) reader.refuse(`unit_cm is ${unitCm}, not a length above 0`);
   const angleUnit = upTo(MAX_ANGLE_UNIT, reader, "angle_unit");
   const axes = readAxes(reader);
   const base = reader.optional(() => hex(reader.take(ID_SIZE)));

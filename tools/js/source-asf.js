@@ -105,7 +105,7 @@ class AsfReader {
     if (bone === null) refuse(`${words[0]} outside of begin and end`);
     if (key === "end") {
       if (bone.name === "" || bone.name === "root" || this.bones.has(bone.name)) {
-        refuse(`a bone without a name of its own: ${bone.name}`);
+        refuse(`a bone needs a unique name, not ${bone.name}`);
       }
       this.bones.set(bone.name, bone);
       this.bone = null;
@@ -167,7 +167,7 @@ class AsfReader {
         waiting.delete(next.name);
       }
     }
-    if (waiting.size > 0) refuse("hierarchy: a circle of bones");
+    if (waiting.size > 0) refuse("hierarchy: bones form a cycle");
     return result;
   }
 }
@@ -190,7 +190,7 @@ function channelOf(dof) {
 
 function numberOf(word) {
   const number = NUMBER.test(word ?? "") ? Number(word) : NaN;
-  if (!Number.isFinite(number)) refuse(`${word}, where a number was expected`);
+  if (!Number.isFinite(number)) refuse(`expected a number, not ${word}`);
   return number;
 }
 

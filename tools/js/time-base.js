@@ -20,9 +20,9 @@ const MAX_NUMBER = 2 ** 52 - 1; // of a frame
 export function readTimeBase(reader, open) {
   const number = reader.zigzag();
   const firstTime = reader.optional(() => reader.f64());
-  if (firstTime !== null && !Number.isFinite(firstTime)) reader.refuse(`a time of ${firstTime}`);
+  if (firstTime !== null && !Number.isFinite(firstTime)) reader.refuse(`a first time of ${firstTime} is not finite`);
   const missing = readMissing(reader);
-  if (open && missing.length > 0) reader.refuse("missing frames of an open clip");
+  if (open && missing.length > 0) reader.refuse("an open clip states missing frames");
   return { number, firstTime, missing };
 }
 
@@ -31,7 +31,7 @@ export function readMissing(reader) {
   return reader.counted(() => {
     const run = { frames: reader.varint(), length: reader.varint() };
     if (run.frames === 0) reader.refuse("frames are missing before the first, or twice in a row");
-    if (run.length === 0) reader.refuse("a run of no missing frames");
+    if (run.length === 0) reader.refuse("a run of missing frames is empty");
     return run;
   });
 }

@@ -99,7 +99,7 @@ export class Walk {
   }
 
   readHead({ type, payload }) {
-    if (type !== "HEAD") this.refuse(`${type} where HEAD is due`);
+    if (type !== "HEAD") this.refuse(`the first chunk is ${type}, not HEAD`);
     this.file.limits = readHead(payload);
     this.file.head = payload;
   }

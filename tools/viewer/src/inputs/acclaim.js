@@ -118,7 +118,7 @@ function readBone(asf, key, words, number) {
   if (!bone) refuse(number, `${shown(words[0])} outside of begin and end`);
   if (key === "end") {
     if (bone.name === "" || bone.name === "root" || asf.bones.has(bone.name)) {
-      refuse(number, `a bone without a name of its own: ${shown(bone.name)}`);
+      refuse(number, `a bone needs a unique name, not ${shown(bone.name)}`);
     }
     if (asf.bones.size >= MOST_BONES) refuse(number, `more than ${MOST_BONES} bones`);
     asf.bones.set(bone.name, bone);
