@@ -161,7 +161,7 @@ REFUSED = [
     ("a < true", "column 3: true and false have no order '<'"),
     ("false >= a", "column 7: true and false have no order '>='"),
     ("a == 'b", "column 6: the text that begins with ' has no end"),
-    (r"a == 'C:\new'", r"column 9: '\\n' is no escape"),
+    (r"a == 'C:\new'", r"column 9: '\\n' is not an escape"),
     ("a == 1e999", "column 6: '1e999' is too great a number"),
     ("a == " + "1" * 101, "is too great a number"),
     ("a ~ 'b'", "column 3: '~' means nothing here"),

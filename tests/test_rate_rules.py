@@ -111,7 +111,7 @@ def test_pack_uses_a_rate_for_files_that_state_none(tmp_path: Path) -> None:
     with mcz.open(target) as file:
         assert {clip.name: clip.frame_rate for clip in file} == {"walk": 120, "run": 60}
     assert (
-        "it states 60 frames a second, 120 are asked for; force_rate=True overrides it"
+        "it states 60 frames a second, not the requested 120; force_rate=True overrides it"
         in notes["run.bvh"]
     )
     assert not notes["walk.amc"]
@@ -150,7 +150,7 @@ def test_force_rate_on_the_command_line(
     arguments = [command, str(folder), str(target), "--rate", "120"]
     arguments += ["--force"] if command == "pack" else []
     assert run(cli, "mcz", arguments) == 0
-    assert "120 are asked for; --force-rate overrides it" in capsys.readouterr().err
+    assert "not the requested 120; --force-rate overrides it" in capsys.readouterr().err
     with mcz.open(target) as file:
         assert [clip.frame_rate for clip in file] == [60]
 

@@ -303,5 +303,5 @@ def _rate_change_notes(clip: Clip, rate: Fraction | None) -> tuple[str, ...]:
     own = clip.frame_rate
     if own is None or rate is None or own == rate:
         return ()
-    text = f"{float(own):g} frames a second are written as {float(rate):g}, as was asked for"
+    text = f"{float(own):g} frames a second are written as {float(rate):g}, as requested"
     return (f"clip {clip.name}: its {text}",)

@@ -84,7 +84,7 @@ class JsonRefused(Failure):
     """A command without JSON output, also of this error."""
 
 
-OUT_OF_MEMORY = "out of memory: the process may not use as much as this needs"
+OUT_OF_MEMORY = "out of memory: this needs more than the process may use"
 
 
 def run(command: click.Command, prog: str, arguments: Sequence[str] | None = None) -> int:

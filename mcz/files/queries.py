@@ -328,6 +328,6 @@ def _unescape(at: int, raw: str, text: str) -> str:
     r"""Unescape a quoted text: \' \" and \\ are the only escapes."""
     for match in _ESCAPE.finditer(raw):
         if match[1] not in "'\"\\":
-            problem = rf"{quote_name(match[0])} is no escape; these are: \' \" \\"
+            problem = rf"{quote_name(match[0])} is not an escape; the escapes are \' \" \\"
             raise fault(text, at + match.start(), problem)
     return _ESCAPE.sub(r"\1", raw[1:-1])

@@ -263,7 +263,7 @@ def test_numbers_that_fall_are_counted_on(asf: Path) -> None:
     data = b"".join(b"%d\nroot 1 2 3 4 5 6\nknee 7\n" % n for n in (7, 9, 3, 4, 6))
     out = io.BytesIO()
     report = encode_live(lines(b":DEGREES\n" + data), out, "amc", *in_channels(asf))
-    assert report.remarks == ("frame 3 comes where 10 is due; the clip counts on",)
+    assert report.remarks == ("frame 3 instead of 10; the clip continues its count",)
     with mcz.open(out.getvalue()) as file:
         assert file.clips["live"].frame_numbers.tolist() == [7, 9, 10, 11, 13]
 

@@ -114,7 +114,7 @@ def test_a_model_of_joints_alone_has_no_other_shapes(tmp_path: Path) -> None:
     path = model(tmp_path / "model.npz", drop=rest)
     found = offsets_of_model(path, 24)
     np.testing.assert_array_equal(offsets_of_model(path, 24, np.zeros(10)), found)
-    with pytest.raises(SourceError, match="to shape it by these, J_regressor, v_template and"):
+    with pytest.raises(SourceError, match="to shape them, J_regressor, v_template and"):
         offsets_of_model(path, 24, [0.5])
 
 
@@ -131,7 +131,7 @@ def test_what_is_pickled_is_never_opened(tmp_path: Path) -> None:
     assert offsets_of_model(model(tmp_path / "j.npz", J_regressor=pickled), 24).shape == (24, 3)
     other = tmp_path / "SMPL_NEUTRAL.pkl"
     other.write_bytes(b"\x80\x04.")
-    with pytest.raises(SourceError, match="never opened here; where you trust it.*shapedirs="):
+    with pytest.raises(SourceError, match="never opened here; if you trust it.*shapedirs="):
         offsets_of_model(other, 24)
 
 

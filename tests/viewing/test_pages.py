@@ -148,7 +148,7 @@ def test_a_page_tells_what_an_mcz_does_not_say(samples: Path, tmp_path: Path, ca
     words = (tmp_path / "a.mcz", samples / "walk.bvh", "--unit", "mm", "--up", "z")
     code, _, errors = call(*words, "-o", tmp_path / "x.html")
     assert (code, errors.count("\n")) == (0, 1)
-    assert "a.mcz: copied as it is, without the unit, up that you give" in errors
+    assert "a.mcz: copied unchanged, without the given unit, up" in errors
     document = embedded_data(tmp_path / "x.html")
     assert document["diffs"][0]["clips"][0]["mean_position_error_cm"] == 0
     copied, made = files_of(document)

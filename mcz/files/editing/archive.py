@@ -237,7 +237,7 @@ def append(
     report.add_messages(notes_on(transaction.paths, {outcome.path for outcome in report.outcomes}))
     report.outcomes += others
     tail = growth.tail
-    text = "it lay whole behind the last FOOT of a file whose writing was cut short"
+    text = "it was complete after the last FOOT of an interrupted file"
     result = "salvaged" if tail.kept else "dropped"
     report.outcomes += [Outcome(name, result, 0, text) for name in tail.names]
     return report

@@ -72,7 +72,7 @@ def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[st
             other = originals.setdefault(fold_name(path), path)
             if other != path:
                 if is_asked:
-                    text = f"many disks take {path!r} for the same name as {other!r}"
+                    text = f"many disks treat {path!r} and {other!r} as one name"
                     notes.setdefault(name, text)
                 break
             path = path.rpartition("/")[0]

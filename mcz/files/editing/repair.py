@@ -327,7 +327,7 @@ def _list_losses(clip: Clip, runs: list[WholeRun], problems: list[Problem]) -> I
     if any(missing.values()):
         return
     if clip.container.directory.clips[clip.name].cend is None:
-        yield f"clip {clip.name!r}: the hashes of its values, which are whole"
+        yield f"clip {clip.name!r}: the hashes of its values, which are intact"
         return
     source = _source_error(clip)
     yield from (about_clip(clip.name, one) for one in problems[:1] if one.message != source)

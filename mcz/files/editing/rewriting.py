@@ -38,7 +38,7 @@ from mcz.files.writing.atomic import replacing_file
 from mcz.model.schema import build, parse, parse_until
 from mcz.model.types import Progress, Target
 
-UNPROTECTED = "its recovery data, which are of the old file: mcz protect makes others"
+UNPROTECTED = "its recovery data, which fit only the old file; mcz protect makes new ones"
 BLOCK = 1 << 20  # bytes of an open DATA that are copied at a time
 
 

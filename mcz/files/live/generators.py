@@ -297,7 +297,7 @@ class LiveText:
                 if number > expected:
                     self.writer.miss(number - expected)
                 elif not is_renumbered:
-                    remark = f"frame {number} comes where {expected} is due; the clip counts on"
+                    remark = f"frame {number} instead of {expected}; the clip continues its count"
                     self.remarks = (*self.remarks, remark)
                     is_renumbered = True
                 expected = number

@@ -285,7 +285,7 @@ def groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...], 
     return groups, [column[c] for c in columns]
 
 
-LOST_BEFORE = "what is before them is lost, and they need it"
+LOST_BEFORE = "they need earlier frames, which are lost"
 Run = tuple[int, int]  # segments first <= i < last
 Complain = Callable[[int, int, object], None]
 

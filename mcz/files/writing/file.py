@@ -198,7 +198,7 @@ def rate_notes(stated: Fraction | None, options: SourceOptions) -> Iterator[str]
     if options.force_rate:
         yield (f"its {float(stated):g} frames a second are replaced by {requested:g}, as requested")
     else:
-        text = f"it states {float(stated):g} frames a second, {requested:g} are asked for"
+        text = f"it states {float(stated):g} frames a second, not the requested {requested:g}"
         yield Remark(text, Hint.FORCE_RATE)
 
 

@@ -265,7 +265,7 @@ def _bytes_of(
         return _encode_file(target, registry, options)
     facts = ", ".join(fact for fact in FACTS if registry.facts.get(fact) is not None)
     if facts and file.kind == "mcz":
-        text = f"{file.name}: copied as it is, without the {facts} that you give"
+        text = f"{file.name}: copied unchanged, without the given {facts}"
         registry.report(with_hint(text, Hint.NAME_CODEC, registry.hints))
     if options.is_cut:
         return _cut(target, registry, options)

@@ -277,7 +277,7 @@ class Server(ThreadingHTTPServer):
         grace: float | None = None,
     ) -> None:
         if host not in HOSTS:
-            text = f"the page is served to this machine alone: one of {', '.join(HOSTS)}"
+            text = f"the page is served only to this machine, as one of {', '.join(HOSTS)}"
             raise OptionError(text, path=host)
         self.address_family = socket.AF_INET6 if ":" in HOSTS[host] else socket.AF_INET
         self.site = Site(

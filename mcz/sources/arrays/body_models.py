@@ -34,18 +34,18 @@ MOST_BYTES = 2**30  # of one array: shapes of SMPL-X have 100 MB
 PICKLES = (".pkl", ".pickle")
 UNREADABLE = (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error)
 UNPICKLED = (
-    "a pickle can run any program, so it is never opened here; where you trust it, write it anew "
+    "a pickle can run any program, so it is never opened here; if you trust it, rewrite it "
     "in Python: m = pickle.load(open('model.pkl', 'rb'), encoding='latin1'); numpy.savez("
     "'model.npz', J_regressor=m['J_regressor'].toarray(), v_template=numpy.array(m['v_template']), "
     "shapedirs=numpy.array(m['shapedirs']), kintree_table=m['kintree_table']), without .toarray() "
-    "where it is dense"
+    "if it is dense"
 )
 UNSHAPED = (
-    "J is where joints are without betas; to shape it by these, J_regressor, v_template and "
+    "J has the joints without betas; to shape them, J_regressor, v_template and "
     "shapedirs of the model are needed as well"
 )
 NOT_DENSE = (
-    "a pickled object, as of a sparse matrix, is never opened here; where you trust the file, "
+    "a pickled object, as of a sparse matrix, is never opened here; if you trust the file, "
     "write a dense one in Python: m = dict(numpy.load('model.npz', allow_pickle=True)); "
     "numpy.savez('dense.npz', J_regressor=m['J_regressor'].item().toarray(), v_template="
     "m['v_template'], shapedirs=m['shapedirs'], kintree_table=m['kintree_table'])"

@@ -55,10 +55,10 @@ SEPARATOR = "/"
 
 
 OLD_TORCH = (
-    "a file of torch before 1.6, which is no ZIP; where you trust it, write it anew in Python: "
+    "a file of torch before 1.6, which is not a ZIP; if you trust it, rewrite it in Python: "
     "torch.save(torch.load(path), path)"
 )
-NO_TORCH = "no file of torch.save: a ZIP that has data.pkl, not compressed"
+NO_TORCH = "not a file of torch.save, which is a ZIP with data.pkl, not compressed"
 NESTS = (Dict, list, tuple, PickledArray)
 
 
