@@ -237,7 +237,7 @@ def ladder(
     big, small = window
     known = _explore(size, settings, big, small)
     for _ in range(MOST_TRIALS):
-        gap, middle = _widest(known, settings, big, small)
+        gap, middle = _widest_step(known, settings, big, small)
         if gap <= math.log(big / small) / n_points or middle is None:
             break
         try:
@@ -249,7 +249,7 @@ def ladder(
         return sorted(known)[:1]
     steps = [(high / low) ** (i / max(1, n_points - 1)) for i in range(n_points)]
     order = sorted({settings.snap(_setting_at(known, low * step)) for step in steps})
-    return order if _falls(known) else order[::-1]
+    return order if _is_falling(known) else order[::-1]
 
 
 def _explore(
@@ -277,12 +277,12 @@ def _explore(
     return known
 
 
-def _falls(known: Known) -> bool:
+def _is_falling(known: Known) -> bool:
     order = sorted(known)
     return known[order[0]] >= known[order[-1]]
 
 
-def _widest(
+def _widest_step(
     known: Known, settings: DialRange, big: float, small: float
 ) -> tuple[float, float | None]:
     """The widest step of sizes between neighboring settings, in logarithms, and its middle."""

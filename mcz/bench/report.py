@@ -159,7 +159,10 @@ def _panel(
     axes.tick_params(labelsize=8)
     above = axes.secondary_xaxis(
         "top",
-        functions=(lambda x: clip.source_bytes / _safe(x), lambda x: clip.source_bytes / _safe(x)),
+        functions=(
+            lambda x: clip.source_bytes / _positive(x),
+            lambda x: clip.source_bytes / _positive(x),
+        ),
     )
     above.set_xlabel("CR: source bytes / coded bytes (cr_source)", fontsize=8)
     above.tick_params(which="both", labelsize=8)
@@ -177,7 +180,7 @@ def plain_ticks(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _safe(x: Any) -> Any:
+def _positive(x: Any) -> Any:
     import numpy as np
 
     return np.maximum(x, 1e-9)

@@ -246,7 +246,7 @@ def tables(clip: ClipResult) -> Iterator[ResultTable]:
         yield _peers(clip)
 
 
-def _about(clip: ClipResult) -> str:
+def _caption(clip: ClipResult) -> str:
     return (
         f"Clip {clip.name}: {clip.n_frames:,} frames, {clip.n_channels} channels, "
         f"{clip.source_bytes:,} bytes of source"
@@ -269,7 +269,7 @@ def _points(clip: ClipResult) -> ResultTable:
         *(("markers mean cm", ".4f"), ("markers max cm", ".3f"), ("SQNR dB", ".2f")),
     )
     caption = (
-        f"{_about(clip)}. {NUMERATORS}. MSE: channels, degrees and length units squared. mean, "
+        f"{_caption(clip)}. {NUMERATORS}. MSE: channels, degrees and length units squared. mean, "
         f"max: position error of the joints' points in {unit}; markers: of three virtual markers "
         "a joint."
     )
@@ -288,7 +288,7 @@ def _points(clip: ClipResult) -> ResultTable:
 
 def at_error(curve: Curve, key: str, figure: float) -> float | None:
     """Bytes at which ``key`` equals ``figure``: straight in logarithms between points."""
-    sizes, errors = _front(curve, key)
+    sizes, errors = _pareto_points(curve, key)
     if len(sizes) < 2 or not errors[-1] <= figure <= errors[0]:
         return None
     where = np.interp(math.log(figure), np.log(errors[::-1]), np.log(sizes[::-1]))
@@ -297,13 +297,13 @@ def at_error(curve: Curve, key: str, figure: float) -> float | None:
 
 def at_size(curve: Curve, key: str, size: float) -> float | None:
     """The figure ``key`` at a size in bytes, likewise."""
-    sizes, errors = _front(curve, key)
+    sizes, errors = _pareto_points(curve, key)
     if len(sizes) < 2 or not sizes[0] <= size <= sizes[-1]:
         return None
     return float(math.exp(np.interp(math.log(size), np.log(sizes), np.log(errors))))
 
 
-def _front(curve: Curve, key: str) -> tuple[Any, Any]:
+def _pareto_points(curve: Curve, key: str) -> tuple[Any, Any]:
     """Sizes ascending and errors descending of the points that no smaller point matches."""
     sizes, negative = pareto_front((size, -error) for size, error in curve.pairs(key))
     return sizes, -negative
@@ -315,7 +315,7 @@ BETWEEN = "interpolated between measured points, in logarithms; - where the code
 def _at_equal(clip: ClipResult) -> Iterator[ResultTable]:
     yield _at_error(clip, "position error", clip.error_key, AT_ERRORS, clip.unit)
     yield _at_error(clip, "MSE", "mse", AT_MSES, "")
-    caption = f"{_about(clip)}. {clip.error_key} in {clip.unit} at cr_source of, {BETWEEN}."
+    caption = f"{_caption(clip)}. {clip.error_key} in {clip.unit} at cr_source of, {BETWEEN}."
     heads = tuple((f"CR {value:g}", ".4f") for value in AT_RATIOS)
     table = ResultTable(
         f"{clip.name}: position error at equal size", caption, (("codec", ""), *heads)
@@ -331,7 +331,7 @@ def _at_error(
     clip: ClipResult, title: str, key: str, errors: Sequence[float], unit: str
 ) -> ResultTable:
     where = f"{key} in {unit}" if unit else key
-    caption = f"{_about(clip)}. cr_source at {where} of, {BETWEEN}."
+    caption = f"{_caption(clip)}. cr_source at {where} of, {BETWEEN}."
     heads = tuple((f"{value:g} {unit}".strip(), ".1f") for value in errors)
     table = ResultTable(f"{clip.name}: CR at equal {title}", caption, (("codec", ""), *heads))
     for curve in clip.plotted_curves:
@@ -347,7 +347,7 @@ def _delta_tables(clip: ClipResult) -> Iterator[ResultTable]:
         ("Bjontegaard delta rate", "bd_rate_pct", "percent of bytes, below 0 is better"),
         ("Bjontegaard delta SQNR", "bd_sqnr_db", "dB, above 0 is better"),
     ):
-        caption = f"{_about(clip)}. The codec of the row against that of the column, in {unit}."
+        caption = f"{_caption(clip)}. The codec of the row against that of the column, in {unit}."
         heads = tuple((label, ".2f") for label in labels)
         table = ResultTable(f"{clip.name}: {title}", caption, (("codec", ""), *heads))
         for row in labels:
@@ -365,7 +365,7 @@ def _speeds(clip: ClipResult) -> ResultTable:
         *(("encode peak MB", ".1f"), ("decode peak MB", ".1f")),
     )
     caption = (
-        f"{_about(clip)}. f/s: frames a second of CPU time, warm, the fastest of several runs, "
+        f"{_caption(clip)}. f/s: frames a second of CPU time, warm, the fastest of several runs, "
         "nothing of ours beside it. encode, decode: the codec alone, memory to memory; write, "
         "read: a whole file in memory with all its hashes. / parse: as a ratio to parsing the "
         "source file in the same run. Peak: memory of the codec alone, beside the values."
@@ -387,7 +387,7 @@ def _peers(clip: ClipResult) -> ResultTable:
         *(("encode f/s", ",d"), ("decode GB/s", ".3f")),
     )
     caption = (
-        f"{_about(clip)}. The same numerators / all bytes of the peer. A matrix has no skeleton, "
+        f"{_caption(clip)}. The same numerators / all bytes of the peer. A matrix has no skeleton, "
         "names or spelling. Rotations are unwrapped in it. GB/s: 8 bytes a value of the clip in a "
         "second of CPU time; of mcz, from opening the file to checked values."
     )

@@ -87,9 +87,9 @@ def _subject_words(figures: Mapping[str, str]) -> Iterator[str]:
 
 def _rows(figures: Mapping[str, str]) -> Iterator[list[str]]:
     notes = {
-        "max_position_error": _where(figures, "max_position_error", "point"),
+        "max_position_error": _place_text(figures, "max_position_error", "point"),
         "shell_mean_cm": _radius(figures),
-        "shell_max_cm": _where(figures, "shell_max", "joint"),
+        "shell_max_cm": _place_text(figures, "shell_max", "joint"),
     }
     for key, value in figures.items():
         metric = key.removeprefix(UNCUT)
@@ -106,7 +106,7 @@ def _rows(figures: Mapping[str, str]) -> Iterator[list[str]]:
             yield [key, _number(value), unit, "", note]
 
 
-def _where(figures: Mapping[str, str], metric: str, label: str) -> str:
+def _place_text(figures: Mapping[str, str], metric: str, label: str) -> str:
     """The place of a maximum, if recorded: ``frame 7, point Head``."""
     words = ("frame", label)
     return ", ".join(f"{w} {figures[f'{metric}_{w}']}" for w in words if f"{metric}_{w}" in figures)
@@ -126,7 +126,7 @@ def _contact_lines(figures: Mapping[str, str]) -> Iterator[str]:
     keys = ("mean", "max", "path", "path_original")
     mean, most, path, meant = (_number(figures.get(f"slide_{key}_mm", "?")) for key in keys)
     if "slide_mean_mm" in figures:
-        where = _where(figures, "slide_max", "joint")
+        where = _place_text(figures, "slide_max", "joint")
         at = f" ({where})" if where else ""
         yield f"feet slide {mean} mm on average, at most {most} mm{at}"
     if "slide_path_mm" in figures:

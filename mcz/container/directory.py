@@ -304,7 +304,7 @@ class PackedClipRow(ClipRow):
 class ClipRows(MutableMapping[str, ClipRow]):
     """Rows by name, in file order; rows of an index are created on first use.
 
-    ``make`` creates a row by its number, ``having`` lists the numbers of clips with a type of
+    ``make`` creates a row by its number, ``groups_with`` lists the numbers of clips with a type of
     ancillary chunks, and ``listed`` has the place of each, see ``places``.
     """
 

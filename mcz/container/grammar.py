@@ -49,7 +49,7 @@ GRAMMAR: dict[str, dict[str, str]] = {
 NAMED: dict[bytes, str] = {kind: kind.name for kind in ChunkType if kind.name in GRAMMAR}
 
 
-def thing_of(chunk: Chunk) -> str:
+def grammar_row_of(chunk: Chunk) -> str:
     """The row of the grammar that a closed chunk belongs to; raises FormatError for wrong flags."""
     thing = NAMED.get(chunk.type)
     if chunk.flags != FLAGS_OF.get(chunk.type, 0 if thing else chunk.flags):  # CHUNK-15

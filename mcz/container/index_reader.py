@@ -124,7 +124,7 @@ def directory_of(indexes: Iterable[Listed]) -> Directory:
         for row in index.index.aliases:
             _add(directory.aliases, row.name, (row.of, row.target))
         clips.add(ClipTables(index))
-        directory.clips = ClipRows(clips.names, clips.row, clips.having, clips.places)
+        directory.clips = ClipRows(clips.names, clips.row, clips.groups_with, clips.places)
         directory.indexes += (place_of(index.chunk, index.n_bytes, directory),)
     if len(directory.clips) < len(clips.names):
         raise FormatError("INDX: two clips have the same name")
@@ -271,7 +271,7 @@ class ClipTables:
         columns = self.offsets, size, self.ends - cend_size, cend_size
         return zip(*(column.tolist() for column in columns), strict=True)
 
-    def having(self, kind: bytes) -> Iterator[int]:
+    def groups_with(self, kind: bytes) -> Iterator[int]:
         """The groups that have an ancillary chunk of a type."""
         groups = [n for n, one in enumerate(self.index.ancillary.blobs("type")) if one == kind]
         yield from (np.searchsorted(self.ancillary_bounds, groups, side="right") - 1).tolist()
@@ -301,10 +301,12 @@ class _Clips:
     def places(self) -> list[Place]:
         return [place for _, tables in self._tables for place in tables.places()]
 
-    def having(self, kind: bytes) -> set[int]:
+    def groups_with(self, kind: bytes) -> set[int]:
         """The numbers of the clips with an ancillary chunk of a type."""
         return {
-            first + group - 1 for first, tables in self._tables for group in tables.having(kind)
+            first + group - 1
+            for first, tables in self._tables
+            for group in tables.groups_with(kind)
         }
 
 

@@ -53,9 +53,9 @@ from mcz.container.grammar import (
     Fault,
     FootEvent,
     PacketEvent,
+    grammar_row_of,
     order_error,
     state_after_misplaced,
-    thing_of,
 )
 from mcz.container.limits import BASE, search_limit
 from mcz.container.segments import FRESH, MASKS, mask_of, parse_segment_header
@@ -303,7 +303,7 @@ class Parser:
         else:
             data = self._bytes(at, at + payload)
         self._go_to(end)
-        return self._place(ChunkEvent(chunk, data, thing_of(chunk)))
+        return self._place(ChunkEvent(chunk, data, grammar_row_of(chunk)))
 
     def _continue_large(self, event: ChunkEvent, crc: int) -> Event:
         """Continue a large chunk; only its last part is in memory."""
@@ -318,7 +318,7 @@ class Parser:
         stored = self._bytes(covered, covered + CRC.size)
         self._parts, self.at = None, covered + CRC.size
         check_crc(chunk, crc, stored)
-        event.thing = thing_of(chunk)
+        event.thing = grammar_row_of(chunk)
         return self._place(event)
 
     def _place(self, event: ChunkEvent) -> Event:

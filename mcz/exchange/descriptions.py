@@ -57,24 +57,24 @@ def datacite(file: File, clips: Sequence[Clip]) -> JsonObject:
     holder = agreed.get("rights-holder")
     record: JsonObject = {
         "doi": agreed.get("doi"),
-        "creators": _each(agreed.get("lab"), lambda name: {"name": name}),
-        "titles": _each(agreed.get("title"), lambda title: {"title": title}),
-        "publisher": _one(agreed.get("contact"), lambda name: {"name": name}),
-        "publicationYear": _one(agreed.get("published"), lambda day: day[:4]),
+        "creators": _parse_each(agreed.get("lab"), lambda name: {"name": name}),
+        "titles": _parse_each(agreed.get("title"), lambda title: {"title": title}),
+        "publisher": _parse_one(agreed.get("contact"), lambda name: {"name": name}),
+        "publicationYear": _parse_one(agreed.get("published"), lambda day: day[:4]),
         "types": {"resourceType": "motion capture", "resourceTypeGeneral": "Dataset"},
         "subjects": [{"subject": word} for word in _keywords(file, clips)],
-        "contributors": _each(
+        "contributors": _parse_each(
             holder, lambda name: {"name": name, "contributorType": "RightsHolder"}
         ),
-        "dates": _each(_range(days), lambda day: {"date": day, "dateType": "Collected"}),
+        "dates": _parse_each(_range(days), lambda day: {"date": day, "dateType": "Collected"}),
         "sizes": [f"{file.size} bytes", count_text(len(clips), "clip")],
         "formats": [MEDIA_TYPE],
         "rightsList": [rights] if rights["rights"] else [],
-        "descriptions": _each(
+        "descriptions": _parse_each(
             agreed.get("description"),
             lambda text: {"description": text, "descriptionType": "Abstract"},
         ),
-        "geoLocations": _each(agreed.get("place"), lambda place: {"geoLocationPlace": place}),
+        "geoLocations": _parse_each(agreed.get("place"), lambda place: {"geoLocationPlace": place}),
         "schemaVersion": "http://datacite.org/schema/kernel-4",
     }
     return _without_empty(record)
@@ -94,7 +94,7 @@ def ro_crate(file: File, clips: Sequence[Clip]) -> JsonObject:
         "description": agreed.get("description"),
         "datePublished": agreed.get("published"),
         "license": {"@id": f"{SPDX}/{licence}"} if is_listed else licence or agreed.get("rights"),
-        "identifier": _one(agreed.get("doi"), lambda doi: f"https://doi.org/{doi}"),
+        "identifier": _parse_one(agreed.get("doi"), lambda doi: f"https://doi.org/{doi}"),
         "creditText": agreed.get("credit"),
         "hasPart": [{"@id": name}],
     }
@@ -105,8 +105,8 @@ def ro_crate(file: File, clips: Sequence[Clip]) -> JsonObject:
         "encodingFormat": MEDIA_TYPE,
         "contentSize": str(file.size),
         "keywords": ", ".join(_keywords(file, clips)),
-        "creator": _one(agreed.get("lab"), lambda _: {"@id": "#lab"}),
-        "copyrightHolder": _one(agreed.get("rights-holder"), lambda _: {"@id": "#holder"}),
+        "creator": _parse_one(agreed.get("lab"), lambda _: {"@id": "#lab"}),
+        "copyrightHolder": _parse_one(agreed.get("rights-holder"), lambda _: {"@id": "#holder"}),
         "hasPart": [{"@id": part} for part in parts],
     }
     graph: list[JsonObject] = [
@@ -170,11 +170,11 @@ def _range(days: Sequence[str]) -> str | None:
     return days[0] if days[0] == days[-1] else f"{days[0]}/{days[-1]}"
 
 
-def _one(text: str | None, make: Callable[[str], object]) -> object:
+def _parse_one(text: str | None, make: Callable[[str], object]) -> object:
     return None if text is None else make(text)
 
 
-def _each(text: str | None, make: Callable[[str], object]) -> list[object]:
+def _parse_each(text: str | None, make: Callable[[str], object]) -> list[object]:
     return [] if text is None else [make(text)]
 
 

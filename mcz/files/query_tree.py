@@ -82,17 +82,19 @@ def truth_of(node: Node) -> Test:
             return _comparison(_value_of(left), sign, _value_of(right))
         case In(operand, literals):
             value = _value_of(operand)
-            return _until(True, [_comparison(value, "==", _value_of(each)) for each in literals])
+            return _first_decisive(
+                True, [_comparison(value, "==", _value_of(each)) for each in literals]
+            )
         case Like(operand, pattern):
-            return _likeness(_value_of(operand), pattern)
+            return _like_pattern(_value_of(operand), pattern)
         case Missing(Name(name)):
             return lambda lookup: lookup(name) is None
         case Not(part):
             return _opposite(truth_of(part))
         case And(parts):
-            return _until(False, [truth_of(part) for part in parts])
+            return _first_decisive(False, [truth_of(part) for part in parts])
         case Or(parts):
-            return _until(True, [truth_of(part) for part in parts])
+            return _first_decisive(True, [truth_of(part) for part in parts])
 
 
 def _value_of(operand: Operand) -> Callable[[Lookup], Value]:
@@ -109,7 +111,7 @@ def _comparison(
     return lambda lookup: compare(left(lookup), sign, right(lookup))
 
 
-def _likeness(value: Callable[[Lookup], Value], pattern: str) -> Test:
+def _like_pattern(value: Callable[[Lookup], Value], pattern: str) -> Test:
     matches = re.compile(translate(pattern)).match
 
     def test(lookup: Lookup) -> bool | None:
@@ -127,7 +129,7 @@ def _opposite(part: Test) -> Test:
     return test
 
 
-def _until(decisive: bool, parts: Sequence[Test]) -> Test:
+def _first_decisive(decisive: bool, parts: Sequence[Test]) -> Test:
     """The first part that is ``decisive``; otherwise unknown if a part is, or its opposite."""
 
     def test(lookup: Lookup) -> bool | None:

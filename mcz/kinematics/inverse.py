@@ -162,7 +162,7 @@ class _Solution:
             counts < counts.max(),
             self.errors
             > OUTLIER_RATIO**2 * np.median(self.errors) + self._lever_squares() * NEGLIGIBLE_SQUARE,
-            _between(jumps, len(counts)),
+            _frames_between_jumps(jumps, len(counts)),
         )
         is_outlier = np.zeros(len(counts), np.bool_)
         for reason in reasons:
@@ -194,7 +194,7 @@ class _Solution:
             self._accept(self._refine(self.columns, prior, weight, SMOOTHING_STEPS), limit)
 
 
-def _between(jumps: Ints, n_frames: int) -> Bools:
+def _frames_between_jumps(jumps: Ints, n_frames: int) -> Bools:
     """Frames between two jumps that are close, or closer than those on either side."""
     between = np.zeros(n_frames, np.bool_)
     borders = np.concatenate([[0], jumps, [n_frames]])

@@ -106,7 +106,11 @@ def counterparts(names: Sequence[str], pairs: Mapping[str, str] | None = None) -
     partners = _pair_numbers(numbers, pairs or {})
     for name, number in numbers.items():
         if number not in partners:
-            other = numbers[name] if (mate := _mate(name, numbers)) is None else numbers[mate]
+            other = (
+                numbers[name]
+                if (mate := _find_counterpart(name, numbers)) is None
+                else numbers[mate]
+            )
             if other in partners:  # taken by ``pairs``
                 raise OptionError(
                     f"mirror: {names[other]!r} would be the counterpart of {name!r} and of "
@@ -130,7 +134,7 @@ def _pair_numbers(numbers: Mapping[str, int], pairs: Mapping[str, str]) -> dict[
     return partners
 
 
-def _mate(name: str, names: Mapping[str, int]) -> str | None:
+def _find_counterpart(name: str, names: Mapping[str, int]) -> str | None:
     for pattern in (_WORD, _LETTER):
         others = [other for other in _swap_sides(pattern, name) if other in names]
         if others:

@@ -170,7 +170,7 @@ def _integer(value: Any) -> int:
     return operator.index(value)
 
 
-def _truth(value: object) -> bool:
+def _to_bool(value: object) -> bool:
     if not isinstance(value, (bool, np.bool_)):
         raise TypeError
     return bool(value)
@@ -289,7 +289,7 @@ def contiguous(array: Items) -> Items:
     return np.array(array, array.dtype.newbyteorder("="), order="C")
 
 
-TEXT, INTEGER, TRUTH = Rule("text", _text), Rule("an integer", _integer), Rule("a bool", _truth)
+TEXT, INTEGER, TRUTH = Rule("text", _text), Rule("an integer", _integer), Rule("a bool", _to_bool)
 NAME = Rule("text that UTF-8 can hold", _name)
 DATA, HASH = Rule("bytes", _data), Rule("32 bytes or none", _hash)
 NUMBER = Rule("a finite number", _number)

@@ -93,7 +93,7 @@ class _Log:
             raise MotionError("there are neither positions nor scalars to log", clip=motion.name)
 
     def all(self) -> None:
-        self._still()
+        self._log_constants()
         per_frame = sum(len(columns) * rate for _, _, columns, rate in self.series)
         per_frame += 0 if self.figure is None else 3 * self.figure.n_nodes
         step = max(1, BLOCK // max(1, per_frame))
@@ -116,7 +116,7 @@ class _Log:
             times.append(self.rerun.TimeColumn("time", duration=seconds))
         self.rerun.send_columns(path, times, columns, recording=self.recording)
 
-    def _still(self) -> None:
+    def _log_constants(self) -> None:
         """Log constants: axes, names, colors, events."""
         rerun, log = self.rerun, self.recording.log
         skeleton = self.motion.skeleton

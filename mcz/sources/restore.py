@@ -143,10 +143,10 @@ class PrintedRows:
         """
         row = 0
         for first, last in self._odd_spans():
-            yield from self._usual(row, first)
-            yield self._odd(first, last)
+            yield from self._restore_plain(row, first)
+            yield self._restore_any(first, last)
             row = last
-        yield from self._usual(row, self.signal.n_rows)
+        yield from self._restore_plain(row, self.signal.n_rows)
 
     def _odd_spans(self) -> list[tuple[int, int]]:
         """Rows start <= r < stop that ``print_rows`` cannot print, as far as is known before."""
@@ -161,7 +161,7 @@ class PrintedRows:
             spans.append((spans.pop()[0] if near else row, row + 1))
         return spans
 
-    def _odd(self, first: int, last: int) -> memoryview:
+    def _restore_any(self, first: int, last: int) -> memoryview:
         """Restore rows with cells of any kind; their size is known before the first is written."""
         whole = (first, last) == (0, self.signal.n_rows)
         signal = self.signal if whole else self.signal.cut(first, last)
@@ -189,8 +189,8 @@ class PrintedRows:
             )
         return out.data[:size]
 
-    def _usual(self, first: int, last: int) -> Iterator[memoryview]:
-        """Rows without known odd cells; those near an unprintable number are left to ``_odd``."""
+    def _restore_plain(self, first: int, last: int) -> Iterator[memoryview]:
+        """Restore rows without odd cells; those near unprintable numbers go to ``_restore_any``."""
         values = np.ascontiguousarray(self.signal.values, np.float64)
         n_odd = NEAR
         for start, stop, grids in _grid_runs(self.signal):
@@ -202,7 +202,7 @@ class PrintedRows:
                     if done:
                         yield text
                     else:
-                        yield self._odd(row, min(row + n_odd, end))
+                        yield self._restore_any(row, min(row + n_odd, end))
                         row, n_odd = min(row + n_odd, end), 2 * n_odd  # a few calls at most
 
     def _print_rows(

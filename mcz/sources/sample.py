@@ -143,7 +143,7 @@ def acclaim_walk() -> Motion:
     for joint in skeleton.joints:
         rotation = dict(zip(("rx", "ry", "rz"), angles[joint.name], strict=True))
         columns += [rotation[c.kind] for c in joint.channels if c.kind in rotation]
-    values = np.stack(columns, axis=1) + _wobble(len(columns))
+    values = np.stack(columns, axis=1) + _slow_drift(len(columns))
     digits = [float(f"{value:.6g}") for value in values.flat]
     signal = _signal(np.array(digits).reshape(values.shape), Grid(GridKind.GENERAL, 6))
     return Motion(skeleton, (signal,), Fraction(FRAME_RATE), name="walk")
@@ -327,7 +327,7 @@ def _curve(tenths: tuple[float, ...], phase: Floats) -> Floats:
     return total
 
 
-def _wobble(n_channels: int) -> Floats:
+def _slow_drift(n_channels: int) -> Floats:
     """Slow drift that keeps two cycles from being equal, (n_frames, n_channels)."""
     number = np.arange(n_channels)
     rate = 0.23 + 0.41 * np.modf(number * 0.618)[0]  # Hz, spread by the golden ratio
@@ -347,11 +347,11 @@ def _local_rotation(joint: Joint, angles: dict[str, Floats]) -> Floats:
 
 def _rotate_fixed(x: Floats, y: Floats, z: Floats) -> Floats:
     """Rotation about the fixed axes x, then y, then z, angles in radians, (n, 3, 3)."""
-    turn: Floats = _about("z", z) @ _about("y", y) @ _about("x", x)
+    turn: Floats = _axis_rotation("z", z) @ _axis_rotation("y", y) @ _axis_rotation("x", x)
     return turn
 
 
-def _about(axis: str, angle: Floats) -> Floats:
+def _axis_rotation(axis: str, angle: Floats) -> Floats:
     """Rotation about one axis, (n, 3, 3)."""
     i = "xyz".index(axis)
     j, k = (i + 1) % 3, (i + 2) % 3

@@ -21,9 +21,9 @@ from mcz.codecs.coding.fast.residual_kernels import (
     REST,
     Predictors,
     Tails,
+    derive_fields,
     is_read,
     read_ordinal,
-    settle,
 )
 from mcz.codecs.coding.fast.survey_kernels import CodedLanes
 from mcz.codecs.coding.fast.write_kernels import put_tail
@@ -378,7 +378,7 @@ def read_ordinals(tails: Tails, lattices: Ints2, leads: Words2, echoes: Ints2, o
     columns = tails.columns
     n_lanes = len(lattices)
     for lane in range(n_lanes):
-        settle(lattices, lane)
+        derive_fields(lattices, lane)
     for row in range(len(out)):
         for lane in range(n_lanes):
             place = echoes[row, lane] if len(echoes) > 0 else 0

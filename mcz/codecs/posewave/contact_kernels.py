@@ -58,16 +58,16 @@ def set_shifts(
         if stands[f] == 1 and (starts[f, 0] != 0 or starts[f, 1] != 0 or starts[f, 2] != 0):
             span = min(ramp, f - 1 - last)
             for n in range(1, min(span, f) + 1):
-                _lean(f, f - n, 1.0 - n / (span + 1.0), shifts, active)
+                _shift_between(f, f - n, 1.0 - n / (span + 1.0), shifts, active)
         if stands[f] != 0 and (f == n_frames - 1 or stands[f + 1] != 2):
             last, span = f, 0
             while span < ramp and (f + span + 1 >= n_frames or stands[f + span + 1] == 0):
                 span += 1
             for n in range(1, min(span, n_frames - 1 - f) + 1):
-                _lean(f, f + n, 1.0 - n / (span + 1.0), shifts, active)
+                _shift_between(f, f + n, 1.0 - n / (span + 1.0), shifts, active)
 
 
-def _lean(end: int, f: int, share: float, shifts: Floats2, active: Ints) -> None:
+def _shift_between(end: int, f: int, share: float, shifts: Floats2, active: Ints) -> None:
     """Shift a frame outside contacts by a share of the shift at the nearest contact."""
     active[f] = LEANING
     for i in range(3):

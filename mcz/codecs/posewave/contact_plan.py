@@ -103,14 +103,16 @@ def parse_contacts(
             rounds=record.rounds,
             ramp=record.ramp,
             joints=tuple(point.joint for point in record.points),
-            tails=np.array([_place(skeleton, p.joint, p.tail, where) for p in record.points]),
+            tails=np.array([_rest_place(skeleton, p.joint, p.tail, where) for p in record.points]),
             steps=tuple(point.step for point in record.points),
             follows=tuple(point.follows for point in record.points),
         )
     return None
 
 
-def _place(skeleton: Skeleton, joint: int, tail: int, where: str) -> tuple[float, float, float]:
+def _rest_place(
+    skeleton: Skeleton, joint: int, tail: int, where: str
+) -> tuple[float, float, float]:
     if joint >= skeleton.n_joints or tail > len(skeleton.joints[joint].tails):  # HOLD-05
         raise FormatError(
             f"{where}: contacts refer to point {tail} of joint {joint}, which does not exist"

@@ -83,7 +83,7 @@ def place_joints(plan: Plan, columns: Floats2, first: int, batch: Lanes, lanes: 
             origins[0, i, p] = 0.0
     for joint in range(len(plan.parents)):
         parent = plan.parents[joint]
-        _hang(axes[parent + 1], origins[parent + 1], plan.arms[joint], origins[joint + 1], lanes)
+        _attach(axes[parent + 1], origins[parent + 1], plan.arms[joint], origins[joint + 1], lanes)
         _move(plan, joint, columns, first, batch, lanes)
         _turn(plan, joint, batch, lanes)
 
@@ -98,7 +98,7 @@ def _take_turns(
                 angles[turn, p], cosines[turn, p] = sine_cosine(angles[turn, p], plan.rule)
 
 
-def _hang(above: Floats2, origin: Floats2, arm: Floats, own: Floats2, lanes: int) -> None:
+def _attach(above: Floats2, origin: Floats2, arm: Floats, own: Floats2, lanes: int) -> None:
     x, y, z = arm[0], arm[1], arm[2]
     for i in range(3):
         for p in range(lanes):

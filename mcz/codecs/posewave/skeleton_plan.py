@@ -129,8 +129,8 @@ def make_plan(
     joints, starts, path = _rows(skeleton, numbers, int(np.count_nonzero(kept)), turning)
     return Plan(
         parents=skeleton.parents,
-        changes=_floats(map(_change, _aboves(skeleton, frames), frames), 3, 3),
-        arms=_floats(map(_arm, skeleton.joints, _aboves(skeleton, frames)), 3),
+        changes=_floats(map(_change, _parent_axes(skeleton, frames), frames), 3, 3),
+        arms=_floats(map(_arm, skeleton.joints, _parent_axes(skeleton, frames)), 3),
         masses=_masses(skeleton, frames, weights, limit_number(float(radius)), float(kappa)),
         moves=_ints(moves, 2),
         directions=_floats(directions, 3),
@@ -188,7 +188,7 @@ def _matrix(rows: Sequence[Sequence[float]]) -> Matrix:
     return (a, b, c), (d, e, f), (g, h, i)
 
 
-def _back(matrix: Matrix, vector: Sequence[float]) -> Vector:
+def _multiply_transposed(matrix: Matrix, vector: Sequence[float]) -> Vector:
     """The transpose of ``matrix`` times ``vector``: along the axes that are its columns."""
     a, b, c = (
         matrix[0][k] * vector[0] + matrix[1][k] * vector[1] + matrix[2][k] * vector[2]
@@ -197,13 +197,15 @@ def _back(matrix: Matrix, vector: Sequence[float]) -> Vector:
     return a, b, c
 
 
-def _aboves(skeleton: Skeleton, frames: list[Matrix]) -> list[Matrix]:
+def _parent_axes(skeleton: Skeleton, frames: list[Matrix]) -> list[Matrix]:
     """C of the parent of every joint, the identity above a root."""
     return [frames[j.parent] if j.parent >= 0 else IDENTITY for j in skeleton.joints]
 
 
 def _change(above: Matrix, frame: Matrix) -> Matrix:
-    columns = [_back(above, (frame[0][k], frame[1][k], frame[2][k])) for k in range(3)]
+    columns = [
+        _multiply_transposed(above, (frame[0][k], frame[1][k], frame[2][k])) for k in range(3)
+    ]
     return _matrix([[column[i] for column in columns] for i in range(3)])
 
 
@@ -213,7 +215,9 @@ def _arm(joint: Joint, above: Matrix) -> Vector:
         return 0.0, 0.0, 0.0
     replaced = set() if joint.adds_to_offset else {channel.kind for channel in joint.channels}
     pairs = zip(POSITION_KINDS, joint.offset, strict=True)
-    return _back(above, [0.0 if kind in replaced else limit_number(x) for kind, x in pairs])
+    return _multiply_transposed(
+        above, [0.0 if kind in replaced else limit_number(x) for kind, x in pairs]
+    )
 
 
 def _moves(
@@ -222,7 +226,7 @@ def _moves(
     moves: list[tuple[int, int]] = []
     directions: list[Vector] = []
     starts, column = [0], 0
-    for joint, above in zip(skeleton.joints, _aboves(skeleton, frames), strict=True):
+    for joint, above in zip(skeleton.joints, _parent_axes(skeleton, frames), strict=True):
         for channel in joint.channels:
             if channel.kind in POSITION_KINDS:
                 moves.append((column, numbers[column]))
@@ -306,7 +310,9 @@ def _masses(
             place = (0.0, 0.0, 0.0)
             if tail >= 0:
                 x, y, z = joint.tails[tail]
-                place = _back(frame, (limit_number(x), limit_number(y), limit_number(z)))
+                place = _multiply_transposed(
+                    frame, (limit_number(x), limit_number(y), limit_number(z))
+                )
             _add_point(own, (1.0 - kappa) / n_points * weights[index], place)
         _add_shell(own, kappa / (3.0 * n_joints) * weights[index], radius, frame)
         result[index] = own
@@ -326,7 +332,7 @@ def _add_point(own: list[float], weight: float, place: Vector) -> None:
 def _add_shell(own: list[float], weight: float, radius: float, frame: Matrix) -> None:
     """Three points at ``radius`` along the axes of W, each of ``weight``."""
     own[0] += 3.0 * weight
-    for k, middle in enumerate(_back(frame, (1.0, 1.0, 1.0))):
+    for k, middle in enumerate(_multiply_transposed(frame, (1.0, 1.0, 1.0))):
         own[1 + k] += weight * radius * middle
         own[4 + k] += 2.0 * (weight * (radius * radius))
 

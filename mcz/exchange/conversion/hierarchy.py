@@ -42,7 +42,7 @@ def to_bvh(motion: Motion, target: str = "BVH") -> Motion:
     skeleton = motion.skeleton
     _check(motion, target)
     if is_bvh(skeleton):
-        return _unmistakable(motion)
+        return _without_offsets(motion)
     Chain(skeleton)  # refuses a skeleton without kinematics
     values = np.asarray(motion.values, np.float64)
     joints: list[Joint] = []
@@ -89,7 +89,7 @@ def _computed_motion(motion: Motion, joints: list[Joint], values: Floats) -> Mot
     return replace(motion, skeleton=converted, signals=(signal,))
 
 
-def _unmistakable(motion: Motion) -> Motion:
+def _without_offsets(motion: Motion) -> Motion:
     """``motion``, its joints without offsets if a reader could misread its positions.
 
     A BVH does not state whether positions add to the offset; without one both are equal.

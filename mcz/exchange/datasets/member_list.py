@@ -236,8 +236,8 @@ class _Agreement:
             if facts[fact] != facts_of_member[fact]:
                 values = facts_of_member[fact], facts[fact]
                 raise OptionError(
-                    f"{member.label} has {_short(*values)}, {first.label} has "
-                    f"{_short(*values[::-1])}: {fact} differ; {advice}"
+                    f"{member.label} has {_fact_text(*values)}, {first.label} has "
+                    f"{_fact_text(*values[::-1])}: {fact} differ; {advice}"
                 )
 
     def _facts(self, clip: Clip, member: Member) -> JsonObject:
@@ -264,7 +264,7 @@ ADVICE = {
 }
 
 
-def _short(fact: object, other: object) -> str:
+def _fact_text(fact: object, other: object) -> str:
     """A fact in words; for names, the first three that differ from ``other``."""
     if isinstance(fact, list) and isinstance(other, list):
         names, others = _names(fact), _names(other)

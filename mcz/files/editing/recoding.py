@@ -60,9 +60,9 @@ class Recoded:
         if self.info.codec.domain == "ordinals":
             self.source.ordinals(start, stop)  # computes the exceptions
         notes, masks = self.source.group_notes(start, stop), self.source.masks(start, stop)
-        return self._own(notes), self._own(masks)
+        return self._streams_by_group(notes), self._streams_by_group(masks)
 
-    def _own(self, streams: Sequence[bytes]) -> dict[int, bytes]:
+    def _streams_by_group(self, streams: Sequence[bytes]) -> dict[int, bytes]:
         return {group: streams[group] if streams else b"" for group in self.groups}
 
 

@@ -84,8 +84,8 @@ class FramesWithLosses:
             if isinstance(parsed, ChunkEvent):
                 yield from self._chunk(parsed)
             elif isinstance(parsed, FootEvent):
-                yield from self._leave("the file ended")
-        yield from self._leave("the stream ended")
+                yield from self._abandon_clip("the file ended")
+        yield from self._abandon_clip("the stream ended")
         self._summary.is_cut = is_cut
         self._summary.is_checked = bool(self._all_checked)
 
@@ -150,7 +150,7 @@ class FramesWithLosses:
         """Begin a clip, unless it is the open one repeated."""
         if self._course is not None and self._course.opening == event.data:
             return
-        yield from self._leave("another clip began")
+        yield from self._abandon_clip("another clip began")
         try:
             fields = parse(payloads.Clip, event.payload, "CLIP")
             followed = begin_clip(self._head, self._shared, row_of(fields, event.chunk), fields)
@@ -194,7 +194,7 @@ class FramesWithLosses:
         else:
             self._all_checked = False
 
-    def _leave(self, why: str) -> Iterator[LiveFrame]:
+    def _abandon_clip(self, why: str) -> Iterator[LiveFrame]:
         """Give up the open clip, whose end did not come."""
         course, self._course = self._course, None
         if course is not None:
@@ -306,7 +306,7 @@ class Concealer:
         valid = np.ones(values.shape, np.bool_) if mask is None else mask
         row = values if mask is None else np.where(valid, values, np.nan)
         if self._owed:
-            yield from self._between(row, valid)
+            yield from self._interpolate(row, valid)
         self.due, self._last = number + 1, (row, valid)
         yield LiveFrame(number - self._first, row, valid)  # LIVE-02
 
@@ -345,7 +345,7 @@ class Concealer:
             return LiveFrame(number - self._first, *self._nothing, "missing")
         return LiveFrame(number - self._first, *self._last, "concealed")  # LIVE-01
 
-    def _between(self, values: Floats, valid: Mask) -> Iterator[LiveFrame]:
+    def _interpolate(self, values: Floats, valid: Mask) -> Iterator[LiveFrame]:
         """The frames that are owed, on straight lines from the last decoded one to ``values``."""
         assert self._last is not None
         assert self.due is not None

@@ -210,7 +210,7 @@ def find_clip_name(clips: Clips, name: str) -> str:
 def names_of(clips: Clips) -> dict[str, set[str]]:
     """The possible names of clips, for many calls of ``matching_clips``."""
     known: dict[str, set[str]] = {name: {name} for name in clips}
-    for names in _naming_ways(clips):
+    for names in _name_getters(clips):
         clips_of: dict[str, set[str]] = {}
         for called, clip in names:
             clips_of.setdefault(called, set()).add(clip)
@@ -222,13 +222,13 @@ def matching_clips(clips: Clips, name: str) -> list[str]:
     """The names of the clips that ``name`` may refer to, sorted."""
     if name in clips.rows:
         return [name]
-    for names in _naming_ways(clips):
+    for names in _name_getters(clips):
         if matches := sorted({clip for known, clip in names if known == name}):
             return matches
     return []
 
 
-def _naming_ways(clips: Clips) -> Iterator[Named]:
+def _name_getters(clips: Clips) -> Iterator[Named]:
     """The names that clips may have, the plainest way first; the last reads of their sources."""
     names = [(name, name) for name in clips]
     others = list(_clip_aliases(clips))

@@ -221,18 +221,18 @@ def _choose_candidate(
         fitting = [one for one in candidates if one.grade == grade]
         nearest = [one for one in fitting if one.candidate.rank == fitting[0].candidate.rank]
         if nearest:
-            return _only(path, nearest, candidates)
+            return _only_fitting(path, nearest, candidates)
     others = [_try(candidate, counts) for candidate in around if not candidate.name_of]
     if candidates:
-        raise _riddle_error(
+        raise _undecidable_error(
             path, [*candidates, *others], "a skeleton has its name, but not its bones"
         )
     for grade in (2, 1):
         fitting = [one for one in others if one.grade == grade]
         if fitting:
-            return _only(path, fitting, others)
+            return _only_fitting(path, fitting, others)
     if others:
-        raise _riddle_error(path, others, "no skeleton around has its name or its bones")
+        raise _undecidable_error(path, others, "no skeleton around has its name or its bones")
     return None
 
 
@@ -246,7 +246,7 @@ def _try(candidate: Candidate, counts: Counts) -> _Candidate:
     return _Candidate(candidate, skeleton, match_bones(skeleton, counts))
 
 
-def _only(path: Path, fitting: list[_Candidate], all_: list[_Candidate]) -> SkeletonChoice:
+def _only_fitting(path: Path, fitting: list[_Candidate], all_: list[_Candidate]) -> SkeletonChoice:
     first = fitting[0]
     if len(fitting) > 1:
         if first.candidate.name_of:
@@ -292,7 +292,7 @@ class AmbiguousError(SourceError):
 
 
 def _ambiguous_error(path: Path, candidates: Sequence[_Candidate], text: str) -> AmbiguousError:
-    riddle = _riddle_error(path, candidates, text)
+    riddle = _undecidable_error(path, candidates, text)
     error = AmbiguousError(riddle.message, **riddle.fields)
     error.reason = (
         f"{text}: {_first_bones([_printable(one.candidate.path.name) for one in candidates])}"
@@ -300,7 +300,7 @@ def _ambiguous_error(path: Path, candidates: Sequence[_Candidate], text: str) ->
     return error
 
 
-def _riddle_error(path: Path, candidates: Sequence[_Candidate], text: str) -> SourceError:
+def _undecidable_error(path: Path, candidates: Sequence[_Candidate], text: str) -> SourceError:
     names = first_names([_printable(one.describe(path.parent)) for one in candidates], SHOWN)
     return SourceError(f"{text}: {names}", path=path, hint=Hint.SKELETON)
 

@@ -220,7 +220,7 @@ def search(
         is_next = high / low < CLOSE or (dial.is_integer and high - low <= 1)
         if meets[1] >= GOAL * target.limit or is_next:
             break
-        setting = _between(meets, misses, target.limit)
+        setting = _interpolate_setting(meets, misses, target.limit)
         if dial.is_integer:  # strictly between the two
             setting = min(max(round(setting), low + 1), high - 1)
         point = setting, _measure_figure(dial, measured, target, setting)
@@ -327,7 +327,7 @@ def _fit_range(dial: Dial, setting: float) -> float:
     return min(max(round(setting) if dial.is_integer else setting, dial.low), dial.high)
 
 
-def _between(meets: Point, misses: Point, limit: float) -> float:
+def _interpolate_setting(meets: Point, misses: Point, limit: float) -> float:
     """A setting between two, where a straight line in logarithms meets the target, or halfway."""
     low, high = math.log(meets[0]), math.log(misses[0])
     share = 0.5

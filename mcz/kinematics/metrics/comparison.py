@@ -352,13 +352,13 @@ class PositionErrors:
 
     def point_where(self) -> tuple[int, str] | None:
         """Frame and point of the greatest distance; ties: the first."""
-        return self._where(self.points, self._names)
+        return self._worst_place(self.points, self._names)
 
     def shell_where(self) -> tuple[int, str] | None:
         """Frame and joint of the greatest distance of the shell; ties: the first."""
-        return self._where(self.shell, self._a.addresses())
+        return self._worst_place(self.shell, self._a.addresses())
 
-    def _where(self, errors: Distances, names: Sequence[str]) -> tuple[int, str] | None:
+    def _worst_place(self, errors: Distances, names: Sequence[str]) -> tuple[int, str] | None:
         if errors.where is None:
             return None
         row, point = errors.where

@@ -250,7 +250,7 @@ class Travel:
             if above < 0:
                 carrier = self._carrier(joint, other)
                 if carrier >= 0 and carrier not in ways:
-                    ways[carrier] = self._way(joint, other)
+                    ways[carrier] = self._shift_from_rest(joint, other)
             elif is_moving(self.target.joints[joint].channels):
                 step = self.scale * self._step(other)
                 ways[joint] = to_world(inverse_turns(rest[above]), step)
@@ -288,7 +288,7 @@ class Travel:
                     f"lacks channel {kind}, along which the motion moves it"
                 )
 
-    def _way(self, joint: int, other: int) -> Floats:
+    def _shift_from_rest(self, joint: int, other: int) -> Floats:
         """Shift of ``joint`` from its rest, (3, F), with all joints above it at rest."""
         rest = rest_positions(self.target)[joint]
         result: Floats = self.scale * self.origins[:, other].T - rest[:, None]

@@ -145,7 +145,9 @@ def select(
     skeleton = motion.skeleton
     indices = _kept_joints(skeleton, joints)
     above = _parents(skeleton, indices)
-    moved = {joint: name for joint in indices if (name := _obstacle(motion, joint, above[joint]))}
+    moved = {
+        joint: name for joint in indices if (name := _blocking_joint(motion, joint, above[joint]))
+    }
     if moved and not allow_translation:
         joint, name = next(iter(moved.items()))
         raise OptionError(
@@ -191,7 +193,7 @@ def _parents(skeleton: Skeleton, indices: list[int]) -> dict[int, int]:
     return above
 
 
-def _between(skeleton: Skeleton, joint: int, above: int) -> list[int]:
+def _joints_between(skeleton: Skeleton, joint: int, above: int) -> list[int]:
     between = []
     parent = skeleton.joints[joint].parent
     while parent != above:
@@ -200,10 +202,10 @@ def _between(skeleton: Skeleton, joint: int, above: int) -> list[int]:
     return between
 
 
-def _obstacle(motion: Motion, joint: int, above: int) -> str:
+def _blocking_joint(motion: Motion, joint: int, above: int) -> str:
     """The name of a joint in between that cannot be left out, "" if all can."""
     skeleton = motion.skeleton
-    between = _between(skeleton, joint, above)
+    between = _joints_between(skeleton, joint, above)
     turning = [k for k in between if not _rests(motion, k)]
     if between and above >= 0:  # it would stretch the longer bone
         kinds = {channel.kind for channel in skeleton.joints[above].channels}
@@ -226,7 +228,7 @@ def _rests(motion: Motion, index: int) -> bool:
 def _fold_offsets(skeleton: Skeleton, index: int, above: int) -> Joint:
     """Add the offsets of the joints between it and ``above`` to the joint's own."""
     joint = skeleton.joints[index]
-    between = _between(skeleton, index, above)
+    between = _joints_between(skeleton, index, above)
     base = skeleton.offsets[between[::-1]].sum(axis=0)
     if not base.any():
         return joint

@@ -218,8 +218,8 @@ class Grid:
         else:
             values = chosen.values()
             ordinals[known] = self.ordinals(values)[0]
-            unsure &= ~_beyond(known, values)
-            known &= ~_beyond(known, values)
+            unsure &= ~_is_beyond(known, values)
+            known &= ~_is_beyond(known, values)
         known[unsure] = self.texts(ordinals[unsure]).equal(tokens[unsure].texts())
         ordinals[~known] = 0
         return ordinals, known
@@ -299,7 +299,7 @@ def _fields_of(grid: Grid) -> GridFields:
 GRID = Adapted(GridFields, _grid_of, _fields_of)
 
 
-def _beyond(chosen: Bools, values: Floats) -> Bools:
+def _is_beyond(chosen: Bools, values: Floats) -> Bools:
     """Mask of all tokens beyond binary64; ``values`` are the values of ``chosen``.
 
     The greatest number, printed with fewer digits, reads as infinity: its text is an exception.

@@ -71,7 +71,7 @@ class Varint(construct.Construct):
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> int:
         first = stream.read(1)
-        return first[0] if first and first[0] < 0x80 else _longer(first, stream, path)
+        return first[0] if first and first[0] < 0x80 else _read_long_varint(first, stream, path)
 
     def _build(self, obj: int, stream: BinaryIO, context: Container, path: str) -> int:
         _write(stream, varint(obj), path)
@@ -91,7 +91,7 @@ class Sized(construct.Construct):
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> bytes:
         first = stream.read(1)
-        size = first[0] if first and first[0] < 0x80 else _longer(first, stream, path)
+        size = first[0] if first and first[0] < 0x80 else _read_long_varint(first, stream, path)
         data = stream.read(size)
         if len(data) != size:
             raise construct.StreamError(f"{len(data)} of {size} bytes left", path=path)
@@ -275,7 +275,7 @@ def field_path(path: str) -> str:
     return ".".join(path.split(" -> ")[1:])
 
 
-def _longer(first: bytes, stream: BinaryIO, path: str) -> int:
+def _read_long_varint(first: bytes, stream: BinaryIO, path: str) -> int:
     """A varint of several bytes that begins with ``first``."""
     if not first:
         raise construct.StreamError("0 of 1 bytes left", path=path)

@@ -190,13 +190,13 @@ def radii(body: Body, places: Floats, size: float) -> Floats:
         reach[start] = max(reach[start], reach[end] + lengths[bone])
     ahead = reach[body.bones[:, 1]]
     result: Floats = THICK * np.sqrt(np.stack([ahead + lengths, ahead], axis=1) * size)
-    result[_trunk(body, ahead, size)] *= TRUNK
+    result[_trunk_bones(body, ahead, size)] *= TRUNK
     result = np.minimum(result, (SHORT * lengths + THIN * size)[:, None])
     result[:, 1] = np.maximum(result[:, 1], 0.45 * result[:, 0])
     return np.maximum(result, 0.5 * THIN * size)
 
 
-def _trunk(body: Body, ahead: Floats, size: float) -> Flags:
+def _trunk_bones(body: Body, ahead: Floats, size: float) -> Flags:
     """Flags of the trunk's bones: between the sides, before arms or further bones."""
     sides = body.sides[body.bones[:, 1]]
     return np.asarray((sides == MIDDLE) & (ahead > 0.28 * size) & bool((sides == LEFT).any()))

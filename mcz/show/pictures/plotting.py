@@ -91,7 +91,7 @@ def _draw_bars(
 ) -> None:
     axes = style(figure.subplots(), theme, x="bytes")
     places, left = np.arange(len(bars))[::-1], np.zeros(len(bars))
-    ramp = _ramp(theme, sorts)
+    ramp = _colors_of_parts(theme, sorts)
     for sort in sorts:
         sizes = np.array([own.get(sort, 0) for _, own in bars], float)
         axes.barh(places, sizes, left=left, color=ramp[sort], label=part_name(sort), height=0.72)
@@ -114,7 +114,7 @@ def _with_rest(ordered: Sequence[tuple[str, Parts]]) -> list[tuple[str, Parts]]:
     return bars
 
 
-def _ramp(theme: Theme, sorts: Sequence[Sort]) -> dict[Sort, Any]:
+def _colors_of_parts(theme: Theme, sorts: Sequence[Sort]) -> dict[Sort, Any]:
     """Colors: resolutions from strong to pale, other parts in another color."""
     strong, pale = np.array(rgb(theme.series[0])), np.array(rgb(theme.grid))
     levels = [sort for sort in sorts if sort is not None]

@@ -84,8 +84,8 @@ def plain_c3d(motion: Motion) -> Motion:
     grids = (Grid(GridKind.SCALED, scale=scale), Grid(GridKind.INTEGER)) if scale else (FLOATS,) * 2
     if residuals is None:
         residuals = _residuals(placed, motion.n_frames)
-    signals = [_on(signal, grids[0]) for signal in placed]
-    signals += [_on(signal, grids[1]) for signal in (residuals, analog) if signal is not None]
+    signals = [_regrid(signal, grids[0]) for signal in placed]
+    signals += [_regrid(signal, grids[1]) for signal in (residuals, analog) if signal is not None]
     section_data = SectionData(
         [*names, *listed.labels],
         listed,
@@ -165,7 +165,7 @@ def _without_nan(points: Signal) -> Signal:
     return replace(points, mask=~nan if points.mask is None else points.mask & ~nan)
 
 
-def _on(signal: Signal, grid: Grid) -> Signal:
+def _regrid(signal: Signal, grid: Grid) -> Signal:
     """The signal on another grid; raises MotionError if that has no number nearby."""
     if all(own == grid for own in signal.grids) and not signal.grid_changes:
         return signal

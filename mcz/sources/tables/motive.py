@@ -91,7 +91,7 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     cells.insert(head.time, [n])
     table = read_table(data, head.rows, n + 1, cells, head.separator, numbers_at=n)
     texts = [order[text.column] if text.column < n else None for text in table.texts]
-    objects = _without(objects, texts)
+    objects = _drop_columns(objects, texts)
     n_values = sum(len(motion.columns) for motion in objects)
     time = n_values + sum(text.n_numbers for text in table.texts)
     rows = move_zeros_to_gaps(
@@ -205,7 +205,7 @@ def _without_kind(channel: Channel) -> Channel:
     return Channel("", f"Rotation {channel.kind[1].upper()}")
 
 
-def _without(objects: Sequence[_Object], columns: Sequence[int | None]) -> list[_Object]:
+def _drop_columns(objects: Sequence[_Object], columns: Sequence[int | None]) -> list[_Object]:
     """The objects without these columns, and without those that have no other."""
     rest = []
     for one in objects:

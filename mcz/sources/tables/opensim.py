@@ -68,7 +68,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     encoding = text_encoding(data)
     header = _trc_header(data)
     labels = _marker_names(data[slice(*header.labels)], encoding)
-    n_markers = max(len(labels), _widest(data, header.rows))
+    n_markers = max(len(labels), _count_markers(data, header.rows))
     names = (*labels, *(f"marker {k + 1}" for k in range(len(labels), n_markers)))
     time = 3 * n_markers
     columns = [[FRAME_NUMBER], [time], *([c] for c in range(time))]
@@ -128,7 +128,7 @@ def _marker_names(line: bytes, encoding: str) -> list[str]:
     return [cell.decode(encoding) for cell in cells[2:] if cell]
 
 
-def _widest(data: bytes, at: int) -> int:
+def _count_markers(data: bytes, at: int) -> int:
     """Number of markers of the longest row."""
     cells = max((line.rstrip().count(b"\t") for line in data[at:].split(b"\n")), default=1)
     return max(0, -(-(cells - 1) // 3))

@@ -186,7 +186,7 @@ def read_table(
     if missing:
         gone = blank | _are(data, rows, missing)
         gone[:, texts] = False
-    rows = append_rest(_without(rows, gone), whole[len(data) :])
+    rows = append_rest(_drop_tokens(rows, gone), whole[len(data) :])
     if not texts or numbers_at is None:
         return TableRows(rows, missing)
     cell_numbers = {column: list(columns).index([column]) + 1 for column in texts}
@@ -230,7 +230,7 @@ def _are(data: bytes, rows: TokenRows, word: bytes) -> Bools:
     return same
 
 
-def _without(rows: TokenRows, gone: Bools) -> TokenRows:
+def _drop_tokens(rows: TokenRows, gone: Bools) -> TokenRows:
     if not gone.any():
         return rows
     keep = ~gone

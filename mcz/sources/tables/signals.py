@@ -88,7 +88,10 @@ def _grids(
     if printed.all():
         return (common,) * n_columns, (), printed
     places = _by_column(mask)
-    own = {c: fit_grid(tokens[places[c][0]])[::2] for c in _doubtful(tokens, mask, common, printed)}
+    own = {
+        c: fit_grid(tokens[places[c][0]])[::2]
+        for c in _doubtful_columns(tokens, mask, common, printed)
+    }
     common, printed = _common_grid(tokens, [grid for grid, _ in own.values()], common, printed)
     grids, changes = [common] * n_columns, []
     for c, (grid, mine_printed) in own.items():
@@ -101,7 +104,7 @@ def _grids(
     return tuple(grids), tuple(sorted(changes, key=lambda change: change[:2])), printed
 
 
-def _doubtful(tokens: Tokens, mask: Bools, common: Grid, printed: Bools) -> list[int]:
+def _doubtful_columns(tokens: Tokens, mask: Bools, common: Grid, printed: Bools) -> list[int]:
     """The columns that may fit another grid than ``common`` better, as they have exceptions."""
     missed = np.flatnonzero(~printed)
     cells = missed if mask.all() else np.flatnonzero(mask)[missed]
@@ -187,7 +190,7 @@ def read_columns(data: bytes, rows: TokenRows, columns: Sequence[int], n_each: i
     rows = select_columns(rows, columns)
     signal = read_signal(data, rows, n_each)
     tried = range(min(len(columns), MOST_TRIED))
-    better_columns = {c: better for c in tried if (better := _better(data, rows, signal, c))}
+    better_columns = {c: better for c in tried if (better := _better_grid(data, rows, signal, c))}
     if not better_columns:
         return signal
     grids = list(signal.grids)
@@ -264,7 +267,7 @@ def table_metadata(encoding: str, notes: Sequence[str]) -> dict[str, str]:
     return {key: value for key, value in metadata.items() if value}
 
 
-def _better(
+def _better_grid(
     data: bytes, rows: TokenRows, signal: Signal, column: int
 ) -> tuple[Grid, list[tuple[int, bytes]]] | None:
     """A grid that suits the column better than that of the signal, with what it does not print."""

@@ -184,7 +184,7 @@ def _read(data: bytes, part: _Part) -> _Read:
         raise SourceError(
             f"section {part.title[:40]!r}: a sub frame is no number", line=line_of(data, part.rows)
         )
-    part = _without(part, [text.column for text in table.texts])
+    part = _drop_text_columns(part, [text.column for text in table.texts])
     n = table.rows.start.shape[1] - 1
     rows = move_zeros_to_gaps(data, table.rows, (range(part.n_columns),))
     numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
@@ -207,7 +207,7 @@ def _read(data: bytes, part: _Part) -> _Read:
     return _Read(part, table, rows, numbers, n_each, not in_order)
 
 
-def _without(part: _Part, texts: Sequence[int]) -> _Part:
+def _drop_text_columns(part: _Part, texts: Sequence[int]) -> _Part:
     """``part`` without the columns that are text, and with their names."""
     groups: list[tuple[str, list[tuple[str, str]]]] = []
     labels = []

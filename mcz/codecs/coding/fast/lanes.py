@@ -219,7 +219,7 @@ def _read_tails(batch: Sequence[Lanes]) -> None:
     """Fill the columns of lanes; groups with other tails than digits are decoded as by kernels."""
     for lanes in batch:
         for lane in range(len(lanes.lattices)):
-            tail.settle(lanes.lattices, lane)
+            tail.derive_fields(lanes.lattices, lane)
     lattices = np.concatenate([lanes.lattices for lanes in batch])
     is_odd = (lattices[:, tail.DIGITS] > 9) & (lattices[:, tail.BASE] == 10)
     is_odd |= (lattices[:, tail.TINY] > 0) | (lattices[:, tail.REST] >= 0)

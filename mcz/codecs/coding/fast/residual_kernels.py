@@ -165,7 +165,7 @@ class Tails(NamedTuple):
     columns: Ints
 
 
-def settle(lattices: Ints2, lane: int) -> None:
+def derive_fields(lattices: Ints2, lane: int) -> None:
     """Fill in what follows from base and digits."""
     base, digits = lattices[lane, BASE], lattices[lane, DIGITS]
     if base == 10:
@@ -293,7 +293,7 @@ def read_ordinals(tails: Tails, lattices: Ints2, leads: Words2, out: Ints2) -> i
     data, bits, ends, starts = tails.data, tails.bits, tails.ends, tails.starts
     columns, n_groups = tails.columns, len(tails.bits)
     for lane in range(len(lattices)):
-        settle(lattices, lane)
+        derive_fields(lattices, lane)
     for row in range(len(out)):
         for group in range(n_groups):  # one after the other: a processor reads several at a time
             bit, end = bits[group], ends[group]

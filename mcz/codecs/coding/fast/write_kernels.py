@@ -25,7 +25,7 @@ from mcz.codecs.coding.fast.residual_kernels import (
     REST,
     TINY,
     TOP,
-    settle,
+    derive_fields,
 )
 from mcz.codecs.coding.fast.survey_kernels import (
     CHANGES,
@@ -111,7 +111,7 @@ def find_leads(lanes: CodedLanes, columns: Ints2) -> None:
     """
     for lane in range(len(lanes.numbers)):
         column, lattice = columns[lanes.numbers[lane]], lanes.lattices[lane]
-        settle(lanes.lattices, lane)
+        derive_fields(lanes.lattices, lane)
         if lattice[BASE]:
             split_classes(column, lattice, lanes.leads[lane])
         else:

@@ -73,7 +73,7 @@ def _fits(
     span = times[last] - times[first]
     for frame in range(first + 1, last):
         share = (times[frame] - times[first]) / span
-        _between(rounded[first], rounded[last], width, angle, share, interpolated)
+        _interpolate(rounded[first], rounded[last], width, angle, share, interpolated)
         square = 0.0
         for k in range(width):
             square += (interpolated[k] - exact[frame, k]) ** 2
@@ -101,7 +101,7 @@ def _angle(one: Floats, other: Floats, width: int) -> float:
     return 2.0 * angle
 
 
-def _between(
+def _interpolate(
     one: Floats, other: Floats, width: int, angle: float, share: float, out: Floats
 ) -> None:
     """Write the interpolation at ``share`` to ``out``; quaternions get the length 1."""
@@ -142,7 +142,7 @@ def interpolate_keys(
         if last > key:
             start = times[frames[key]]
             share = (times[frame] - start) / (times[frames[last]] - start)
-        _between(keys[key], keys[last], width, angle, share, interpolated)
+        _interpolate(keys[key], keys[last], width, angle, share, interpolated)
         for k in range(width):
             out[number, k] = interpolated[k]
 
@@ -265,7 +265,7 @@ class _Channel:
 class _KeySearch:
     def __init__(self, scene: Scene, bound: float) -> None:
         self.scene, self.bound, self.nodes = scene, bound, scene.nodes
-        self.turns = list(map(self._turns, self.nodes, _levers(scene)))
+        self.turns = list(map(self._turns, self.nodes, _descendant_distances(scene)))
         self.shifts = [self._shifts(node) for node in self.nodes]
 
     def _turns(self, node: Node, lever: float) -> _Channel | None:
@@ -297,7 +297,7 @@ class _KeySearch:
                     clip=self.scene.name,
                     hint=Hint.KEY_ERROR,
                 )
-            self._tighten(wrong, 0.0 if number == ROUNDS else TIGHTER)
+            self._tighten_bounds(wrong, 0.0 if number == ROUNDS else TIGHTER)
             errors = self.errors()
         return SceneKeys(
             [self._keys(channel, NO_TURN) for channel in self.turns],
@@ -317,7 +317,7 @@ class _KeySearch:
         )
         return None if at_rest else channel.keys
 
-    def _tighten(self, wrong: NDArray[np.bool_], by: float) -> None:
+    def _tighten_bounds(self, wrong: NDArray[np.bool_], by: float) -> None:
         """Tighten the channels that move the nodes that are ``wrong``, (n_frames, n_nodes)."""
         moved = wrong.copy()  # of each node, whether a node below it or it itself is wrong
         below = np.zeros_like(wrong)
@@ -376,7 +376,7 @@ def _channel(exact: Floats, limit: float, node: Node) -> _Channel:
     return _Channel(np.ascontiguousarray(exact), rounded, limits)
 
 
-def _levers(scene: Scene) -> list[float]:
+def _descendant_distances(scene: Scene) -> list[float]:
     """Greatest distance from each node to a descendant, with the longest bones of some frames."""
     step = max(1, len(scene.times) // SAMPLED_FRAMES)
     levers = [0.0] * len(scene.nodes)
