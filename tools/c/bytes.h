@@ -377,12 +377,12 @@ static void deflate_codes(inflater *f, const huffman *literals, const huffman *d
             deflate_put(f, &(uint8_t){(uint8_t)s}, 1);
             continue;
         }
-        check(&f->in, s < 286, "deflate has a length that is none");
+        check(&f->in, s < 286, "deflate has an invalid length");
         if (f->in.bad) return;
         s -= 257;
         unsigned length = length_base[s] + (s < 8 || s == 28 ? 0 : deflate_bits(f, (int)(s - 4) / 4));
         unsigned d = huffman_take(f, distances);
-        check(&f->in, d < 30, "deflate has a distance that is none");
+        check(&f->in, d < 30, "deflate has an invalid distance");
         if (f->in.bad) return;
         uint64_t distance = 1 + (uint64_t)d;
         if (d >= 4) distance = 1 + ((2 + (uint64_t)(d & 1)) << (d / 2 - 1)) + deflate_bits(f, (int)d / 2 - 1);
@@ -415,7 +415,7 @@ static void inflate(inflater *f) {
     while (!last && !f->in.bad) {
         last = deflate_bits(f, 1);
         unsigned kind = deflate_bits(f, 2);
-        check(&f->in, kind < 3, "deflate has a block of no kind");
+        check(&f->in, kind < 3, "deflate has a block of an unknown kind");
         if (kind == 0) deflate_stored(f);
         if (kind == 1) deflate_fixed(&literals, &distances);
         if (kind == 2) deflate_lengths(f, &literals, &distances);

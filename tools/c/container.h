@@ -211,7 +211,7 @@ static inflater inflater_of(const mcz *m, const cursor *c, unsigned encoding, ui
 }
 
 static void check_encoding(mcz *m, cursor *c, unsigned encoding, uint64_t size) {
-    check(c, encoding <= AFTER_WORDS, "an encoding of no meaning [CONV-15]");
+    check(c, encoding <= AFTER_WORDS, "an unknown encoding [CONV-15]");
     check(c, encoding == STORED || m->profile != SMALL, "an encoding but 0 in the small profile [LIMIT-22]");
     if (encoding == STORED) check(c, size == left(c), "stored bytes of another size than stated");
     check(c, size / 1032 <= left(c), "more than deflate can inflate to [LIMIT-14]");
@@ -329,7 +329,7 @@ static void get_keys(cursor *c, bool pairs, bool once, const char *why, const ch
         mcz_text name = text(c);
         if (pairs) text(c);
         for (int i = 0; forbidden && i < 3; i++)
-            check(c, !same_text(name, forbidden[i]), "a META sets what CLIP says [META-03]");
+            check(c, !same_text(name, forbidden[i]), "a META sets a fact of CLIP [META-03]");
         if (!once || c->bad) continue;
         key k = key_of("key ", name.bytes, name.size);
         size_t i;
@@ -358,14 +358,14 @@ static void check_finite(cursor *c, int n) {
 static size_t get_joint(cursor *c, size_t i, mcz_joint *out) { /* its number of channels */
     out->name = text(c);
     uint64_t parent = varint(c), n;
-    check(c, parent <= i, "a parent behind its child [SKEL-05]");
+    check(c, parent <= i, "a parent after its child [SKEL-05]");
     out->parent = (size_t)parent;
     unsigned flags = get_flags(c, 1 | 2 | 4 | 128);
     for (int j = 0; j < 3; j++) out->offset[j] = flags & 2 ? get_double(c) : 0;
     for (int j = 0; j < 3; j++) check(c, is_finite(out->offset[j]), "an offset that is not finite [SKEL-08]");
     if (flags & 4) {
         check_finite(c, 3);
-        check(c, get8(c) <= 5, "an axis order of no meaning [CONV-15]");
+        check(c, get8(c) <= 5, "an unknown axis order [CONV-15]");
     }
     for (n = counted(c, 24); n && !c->bad; n--) check_finite(c, 3);
     n = counted(c, 2);
@@ -392,11 +392,11 @@ static void skeleton_fields(mcz *m, cursor *c, skeleton *k) {
         double cm = get_double(c);
         check(c, is_finite(cm) && cm > 0, "unit_cm that is not positive and finite [SKEL-01]");
     }
-    check(c, get8(c) <= 2, "an angle unit of no meaning [CONV-15]");
+    check(c, get8(c) <= 2, "an unknown angle unit [CONV-15]");
     unsigned up = get8(c), forward = get8(c);
-    check(c, up <= 6 && forward <= 6, "an axis of no meaning [CONV-15]");
+    check(c, up <= 6 && forward <= 6, "an unknown axis [CONV-15]");
     check(c, !up || !forward || up % 3 != forward % 3, "a figure that faces along its up axis [SKEL-10]");
-    check(c, get8(c) <= 2, "a handedness of no meaning [CONV-15]");
+    check(c, get8(c) <= 2, "an unknown handedness [CONV-15]");
     if (optional(c)) {
         const shared *base = find_shared(m, bytes(c, 16));
         check(c, is_type(m, base, "SKEL"), "a base that no chunk before has [SKEL-02]");
@@ -483,7 +483,7 @@ static bool time_base(cursor *c, clip *k) { /* whether it has a first time */
     bool timed = optional(c);
     if (timed) check(c, is_finite(get_double(c)), "a first time that is not finite [TIME-06]");
     get_missing(c, k);
-    check(c, !k->open || k->n_missing == 0, "CLIP has missing frames that CEND tells [TIME-04]");
+    check(c, !k->open || k->n_missing == 0, "CLIP has missing frames that belong in CEND [TIME-04]");
     return timed;
 }
 
@@ -526,7 +526,7 @@ static void get_grids(mcz *m, cursor *c, signal *s) {
 
 static void get_groups(cursor *c, signal *s, const skeleton *k) { /* [CLIP-08] */
     s->group_kind = (uint8_t)get8(c);
-    check(c, s->group_kind <= 3, "groups of no kind [CONV-15]");
+    check(c, s->group_kind <= 3, "groups of an unknown kind [CONV-15]");
     check(c, s->group_kind != 1 || !s->own, "groups per joint without the skeleton's channels [CLIP-09]");
     if (s->group_kind == 0) s->n_groups = s->n_channels > 0;
     if (s->group_kind == 1) s->n_groups = k->n_groups;
@@ -561,7 +561,7 @@ static void get_signal(mcz *m, cursor *c, const clip *k, size_t index, signal *s
     s->role = (uint8_t)get8(c);
     if (s->role == RESIDUALS) {
         uint64_t of = varint(c);
-        check(c, of < k->n_signals && of != index, "residuals of no other signal [ROLE-05]");
+        check(c, of < k->n_signals && of != index, "residuals of a signal that does not exist [ROLE-05]");
     }
     check(c, s->role != MOTION || index == 0, "a motion that is not the first signal [ROLE-01]");
     s->n_channels = s->own ? (size_t)counted(c, 2) : skel->n_channels;
@@ -631,7 +631,7 @@ static void clip_fields(mcz *m, cursor *c, clip *k) {
 static void read_clip(mcz *m, cursor *c) {
     clip k = {.offset = m->at, .length = left(c), .segments = m->segments.n};
     unsigned major = get8(c), minor = get8(c), head = 256 * m->head.p[2] + m->head.p[3];
-    check(c, c->bad || 256 * major + minor <= head, "a clip that needs more than HEAD says [CLIP-22]");
+    check(c, c->bad || 256 * major + minor <= head, "a clip that needs more than HEAD states [CLIP-22]");
     k.readable = version_is_ours(major, minor); /* [CLIP-23] */
     if (k.readable) clip_fields(m, c, &k);
     m->unread |= !k.readable;
@@ -724,7 +724,7 @@ static void get_segment(const mcz *m, cursor *c, const clip *k, segment *g, stre
     const uint8_t *begin = c->p;
     *g = (segment){.offset = (uint64_t)(c->p - m->data), .size = left(c)};
     uint64_t index = varint(c);
-    check(c, index < k->n_signals, "a segment of no signal [DATA-06]");
+    check(c, index < k->n_signals, "a segment of a signal that does not exist [DATA-06]");
     if (c->bad) return;
     g->signal = (size_t)index;
     const signal *s = ITEM(signal, m->signals, k->signals + index);
@@ -833,7 +833,7 @@ static unsigned read_packet(mcz *m, cursor *c, clip *k, uint64_t sequence, size_
     const uint8_t *begin = c->p;
     unsigned kind = get8(c);
     check(c, !(kind & 0x70), "reserved bits of a packet [PACK-08]");
-    check(c, (kind & 15) <= 2, "a packet of no kind [PACK-09]");
+    check(c, (kind & 15) <= 2, "a packet of an unknown kind [PACK-09]");
     check(c, varint(c) == sequence, "packets that do not count from 0 [PACK-02]");
     uint64_t n = varint(c);
     check(c, n <= MAX_BODY, "the body of a packet is too long [LIMIT-08]");
@@ -897,7 +897,7 @@ static void read_modl(mcz *m, cursor *c) {
 }
 
 static void first_part(mcz *m, cursor *c, named *a) {
-    check(c, a->n_parts >= 1, "an attachment of no parts [ATTA-01]");
+    check(c, a->n_parts >= 1, "an attachment without parts [ATTA-01]");
     check(c, a->size <= bytes_limit(m), "an attachment that is too large [LIMIT-11]");
     check_path(c, a->name, false);
     if (c->bad) return;
@@ -944,7 +944,7 @@ static void read_alia(mcz *m, cursor *c) {
     size_t i;
     const shared *s;
     a.target = sized(c);
-    check(c, a.of <= 2, "an alias of no kind [CONV-15]");
+    check(c, a.of <= 2, "an alias of an unknown kind [CONV-15]");
     check_path(c, a.name, false);
     if (c->bad) return;
     unique_name(m, c, "alia", a.name, m->aliases.n, "two aliases of one name [GRAM-08]");
@@ -1015,7 +1015,7 @@ static void read_copy(mcz *m, cursor *c) {
         const uint8_t *type = bytes(&r, 4);
         mcz_text payload = sized(&r);
         check(&r, may_be_copied(type), "a copy of a chunk of another type [COPY-01]");
-        check(&r, distance && is_chunk(m, at), "a copy of no chunk [COPY-02]");
+        check(&r, distance && is_chunk(m, at), "a copy of a chunk that does not exist [COPY-02]");
         if (r.bad) break;
         const uint8_t *p = m->data + at;
         check(&r, !memcmp(p, type, 4) && load(p + 8, 8) == payload.size, "a copy of another chunk [COPY-02]");

@@ -231,7 +231,7 @@ static void get_form(const grid *g, cursor *c, head *h, unsigned kind) {
     h->form = kind & 128 ? get8(c) : form_of_grid(g);
     h->drop = kind & 128 ? get8(c) : 0;
     bool ten = within(h->form, 1, 15), classes = ten || h->form == 88 || h->form == 117;
-    check(c, classes || h->form == 0 || within(h->form, 32, 34), "a form that is none [FAST-29]");
+    check(c, classes || h->form == 0 || within(h->form, 32, 34), "an unknown form [FAST-29]");
     unsigned most = h->form == 0 ? 32 : h->form == 88 ? 22 : h->form == 117 ? 51 : 0;
     check(c, h->drop <= most, "more bits dropped than the form may [FAST-30]");
     check(c, classes || !(kind & 16), "tiny outside of classes [FAST-22]");
@@ -285,7 +285,7 @@ static void get_head(mcz_rows *r, cursor *c, size_t column, size_t rows) {
         return;
     }
     check(c, kind <= 3 || (h->kind == CONSTANT && kind < 64), "bits of a head that mean nothing [FAST-22]");
-    if (h->kind == COPY) h->source = get_column(r, c, "a copy of no channel [FAST-27]");
+    if (h->kind == COPY) h->source = get_column(r, c, "a copy of a channel that does not exist [FAST-27]");
     if (h->kind == STEPS) get_steps(r, c, column, rows);
     if (h->kind != CONSTANT) return;
     int64_t o = short_ordinal(c, kind >> 2 & 15);

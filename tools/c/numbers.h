@@ -84,7 +84,7 @@ static grid get_grid(cursor *c) {
     g.kind = (uint8_t)get8(c);
     g.digits = (uint8_t)get8(c);
     flags = get8(c);
-    check(c, within(g.kind, FIXED, PRINTED), "a grid of no kind [GRID-01]");
+    check(c, within(g.kind, FIXED, PRINTED), "a grid of an unknown kind [GRID-01]");
     check(c, digits_are_legal(g.kind, g.digits), "a grid with other digits [GRID-02]");
     if (g.kind == SCALED) {
         g.scale = get_double(c);
