@@ -105,6 +105,7 @@ class Peer:
 
 
 def _peers(source: PeerInput) -> Iterator[Peer]:
+    """Yield each installed compressor with each kind of input."""
     have = installed_peers()
     general: dict[str, tuple[Pack, Pack]] = {
         "gzip -9": (lambda data: gzip.compress(data, 9, mtime=0), gzip.decompress),

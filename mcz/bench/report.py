@@ -125,6 +125,7 @@ def _panel(
     panel: tuple[str, str, bool],
     labels: bool,
 ) -> None:
+    """Draw the curves of one figure of a clip over their sizes."""
     key, text, logarithmic = panel
     codecs = list(dict.fromkeys(c.variant.codec if c.variant else c.label for c in curves))
     widest = max((p["coded_bytes"] for c in curves if c.variant for p in c.points), default=0)

@@ -67,15 +67,15 @@ def _integral(x: Values, y: Values, low: float, high: float) -> float:
     h = np.diff(x)
     secants = np.diff(y) / h
     slopes = pchip_slopes(h, secants)
-    # Of each piece y + d t + c t^2 + b t^3, t = distance from its first point.
+    # A piece is y + d t + c t^2 + b t^3, t the distance from its first point.
     c = (3 * secants - 2 * slopes[:-1] - slopes[1:]) / h
     b = (slopes[:-1] + slopes[1:] - 2 * secants) / h**2
 
-    def until(t: Values) -> Values:
+    def primitive(t: Values) -> Values:
         return np.asarray(t * (y[:-1] + t * (slopes[:-1] / 2 + t * (c / 3 + t * b / 4))))
 
     start, stop = np.clip(low - x[:-1], 0, h), np.clip(high - x[:-1], 0, h)
-    return float(np.sum(until(stop) - until(start)))
+    return float(np.sum(primitive(stop) - primitive(start)))
 
 
 def pchip_slopes(h: Values, secants: Values) -> Values:
@@ -199,7 +199,7 @@ def measure_all(
     speeds: bool,
     peers: tuple[str, ...],
 ) -> list[ClipResult]:
-    """All results, clip by clip: sizes and errors first, then speeds with no other task running."""
+    """Measure sizes and errors of all clips, then speeds, with no other task running."""
     tasks = [Task("sweep", c, v, (N_POINTS,)) for c in cases.values() for v in variants]
     swept = runner.run(tasks)
     timed = {}
@@ -291,12 +291,12 @@ def at_error(curve: Curve, key: str, figure: float) -> float | None:
     sizes, errors = _pareto_points(curve, key)
     if len(sizes) < 2 or not errors[-1] <= figure <= errors[0]:
         return None
-    where = np.interp(math.log(figure), np.log(errors[::-1]), np.log(sizes[::-1]))
-    return float(math.exp(where))
+    log_size = np.interp(math.log(figure), np.log(errors[::-1]), np.log(sizes[::-1]))
+    return float(math.exp(log_size))
 
 
 def at_size(curve: Curve, key: str, size: float) -> float | None:
-    """The figure ``key`` at a size in bytes, likewise."""
+    """The figure ``key`` at a size in bytes: straight in logarithms between points."""
     sizes, errors = _pareto_points(curve, key)
     if len(sizes) < 2 or not sizes[0] <= size <= sizes[-1]:
         return None
@@ -330,8 +330,8 @@ def _at_equal(clip: ClipResult) -> Iterator[ResultTable]:
 def _at_error(
     clip: ClipResult, title: str, key: str, errors: Sequence[float], unit: str
 ) -> ResultTable:
-    where = f"{key} in {unit}" if unit else key
-    caption = f"{_caption(clip)}. cr_source at {where} of, {BETWEEN}."
+    goal = f"{key} in {unit}" if unit else key
+    caption = f"{_caption(clip)}. cr_source at {goal} of, {BETWEEN}."
     heads = tuple((f"{value:g} {unit}".strip(), ".1f") for value in errors)
     table = ResultTable(f"{clip.name}: CR at equal {title}", caption, (("codec", ""), *heads))
     for curve in clip.plotted_curves:

@@ -219,6 +219,7 @@ class ClipSelection:
         names: list[str],
         units: Sequence[str] = (),
     ) -> Table:
+        """A table of the chosen rows and columns of a signal."""
         from mcz.files.reading.views import decimate_rows
         from mcz.files.tables import Table
 

@@ -137,6 +137,7 @@ def _encode_file(
     copies: bool | None,
     **options: Any,
 ) -> Exit:
+    """Encode one file, or standard input, and print a summary."""
     import mcz
     from mcz.files.writing.atomic import refuse_inputs
 

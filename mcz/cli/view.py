@@ -283,6 +283,7 @@ def _write_rerun(
 def _log_clips(
     registry: FileRegistry, recording: Any, options: Settings
 ) -> tuple[list[JsonObject], int]:
+    """Log all clips; return a row of facts for each, and the number of failures."""
     from mcz.errors import MczError
     from mcz.show.rerun import to_rerun, view_of
 

@@ -237,7 +237,7 @@ class LiveDecoder(Protocol):
         ...
 
     def skip(self, n_frames: int) -> None:
-        """Note the loss of ``n_frames`` frames."""
+        """Report that ``n_frames`` frames were lost."""
         ...
 
 

@@ -322,7 +322,7 @@ def parse_packet_head(data: bytes | bytearray, at: int, limit: int) -> tuple[int
 
 
 def is_packet(data: bytes, packet: Packet) -> bool:
-    """True if ``data`` ends with such a packet, whatever its sequence number."""
+    """Return True if ``data`` ends with ``packet``, with any sequence number."""
     length = len(packet.body)
     body_at = len(data) - CHECK_SIZE - length
     first, ending = _head(packet.kind, packet.fresh, 0, length)[:1], varint(length)

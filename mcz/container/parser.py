@@ -133,7 +133,7 @@ class Parser:
         self._start, self._data = self._start + n_used, self._data[n_used:] + data
 
     def end(self) -> None:
-        """Note that the stream ends after the bytes that were fed."""
+        """End the stream after the bytes that were fed."""
         self.size, self._name = self._start + len(self._data), "the stream"
 
     def next(self) -> Event | None:

@@ -110,7 +110,7 @@ class Container:
         return _reopen, (self.source, {n: getattr(self, n) for n in names})
 
     def strictly(self) -> Container:
-        """The same file, read with all checks, as an intact one."""
+        """A copy that reads with all checks, as from an intact file."""
         other = Container.__new__(Container)
         other.__dict__.update(self.__dict__ | {"salvage": False, "verify": True})
         return other

@@ -1,8 +1,7 @@
 """A strict scan: the events of a file, checked and collected, up to the first fault.
 
-``check_plain`` has the rules of the profile small. Faults that only decoding shows are found where
-clips are decoded. SPEC.md, "Grammar", "Strict reading", "QUAL", "META", "COPY" and "Limits and
-profiles", are normative.
+``check_plain`` has the rules of the profile small. Decoding clips finds further faults. SPEC.md,
+"Grammar", "Strict reading", "QUAL", "META", "COPY" and "Limits and profiles", are normative.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ def check_skeleton(
     fields = parse(payloads.Skel, plain, where, profile.counts)
     parse_skeleton(fields, profile, where)
     if fields.base is not None:
-        _refer(directory, ChunkType.SKEL, fields.base, where)  # SKEL-02
+        _require_shared(directory, ChunkType.SKEL, fields.base, where)  # SKEL-02
     if fields.source is not None:
         _check_source(fields.source, where, directory, templates, OF_CLIPS)
     return bool(fields.source)
@@ -64,9 +63,9 @@ def _check_source(
     templates: Templates,
     others: frozenset[int],
 ) -> None:
-    """``others``: the formats of the other kind of content."""
+    """Raise FormatError for a bad source; ``others``: formats that this chunk cannot have."""
     id_ = bytes(source.template)
-    _refer(directory, ChunkType.SRCE, id_, where)  # GRAM-03
+    _require_shared(directory, ChunkType.SRCE, id_, where)  # GRAM-03
     if templates.get(id_, source.format) != source.format:  # CLIP-03, SKEL-04
         raise FormatError(
             f"source format is {source.format}, but its SRCE has {templates[id_]}", where=where
@@ -81,7 +80,7 @@ def check_clip(
     fields: payloads.Clip, where: str, directory: Directory, templates: Templates
 ) -> bool:
     """Check the references and names of CLIP; return whether it has a source file."""
-    _refer(directory, ChunkType.SKEL, fields.skeleton, where)  # GRAM-02
+    _require_shared(directory, ChunkType.SKEL, fields.skeleton, where)  # GRAM-02
     if fields.source is not None:
         _check_source(fields.source, where, directory, templates, OF_SKELETONS)
         if fields.source.path:
@@ -92,7 +91,7 @@ def check_clip(
     return bool(fields.source)
 
 
-def _refer(directory: Directory, kind: bytes, id_: bytes, where: str) -> None:
+def _require_shared(directory: Directory, kind: bytes, id_: bytes, where: str) -> None:
     if (kind, bytes(id_)) not in directory.shared:
         raise FormatError(f"no earlier {kind.decode()} has the id {bytes(id_).hex()}", where=where)
 
@@ -141,7 +140,7 @@ ABSENT = {ChunkType.INDX, ChunkType.COPY, ChunkType.MODL}
 
 
 def check_plain(kind: bytes, payload: bytes, where: str) -> None:
-    """Raise LimitError for a chunk that a file of the profile small cannot have."""
+    """Raise LimitError for a chunk that the profile small does not allow."""
     record = ENCODED.get(kind)
     if record is not None:
         packed = vars(parse(record, payload, where))["flags"] & payloads.ENCODING != payloads.STORED
@@ -179,10 +178,10 @@ class ScanResult:
     chunks: list[Chunk] = field(default_factory=list)
     feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
     damage: list[str] = field(default_factory=list)
-    ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
+    ends: dict[int, int] = field(default_factory=dict)  # ends of open DATA chunks by their offsets
     # Parts that salvage could not use: offset, and the chunk if its header is sound.
     broken: list[tuple[int, Chunk | None]] = field(default_factory=list)
-    doubts: bool = False  # it was not clear which clip something belongs to
+    doubts: bool = False  # the clip of some part is uncertain
 
 
 class Scanner:
@@ -252,7 +251,7 @@ class Scanner:
             self.result.chunks.append(event.chunk)
 
     def finish(self) -> None:
-        """Note that nothing follows."""
+        """End the scan; a subclass closes what is open."""
 
     def forget(self) -> None:
         """Drop the places of chunks and segments, which are useless in a stream."""

@@ -148,6 +148,7 @@ class Chain:
         ]
 
     def _link(self, joint: Joint, matrix: Floats | None, start: int) -> Link:
+        """The link of a joint; ``matrix`` turns its own axes, ``start`` is its first column."""
         above = self.turned[joint.parent] if joint.parent >= 0 else None
         if above is None:
             change = matrix

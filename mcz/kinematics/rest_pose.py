@@ -70,7 +70,7 @@ def height_note(skeleton: Skeleton) -> str:
 
 
 def note_on_height(height: float, unit_cm: float) -> str:
-    """The same for a height in length units.
+    """A note on an inhuman height in length units; or "".
 
     >>> note_on_height(27.5, 2.54)
     'height 27.5 units = 69.9 cm, which is not human; is 1 unit = 2.54 cm right?'

@@ -246,6 +246,7 @@ def _read_segment(
     request: Request,
     fetch: Fetch,
 ) -> None:
+    """Fill the requested frames and channels of one segment into ``out``."""
     span = spans[index]
     start, stop = max(span.first, request.start), min(span.stop, request.stop)
     frames = marks_of(span.first, span.stop, fields.coded_frames, fields.delta)

@@ -234,7 +234,7 @@ def greatest_degrees(step_cm: float) -> float:
 
 
 def greatest_cm(step_cm: float) -> float:
-    """The same of a position."""
+    """The greatest step of a position in cm, which grows with coarse steps."""
     return greatest_degrees(step_cm) * (5.0 if step_cm < 0.1 else 0.5)
 
 

@@ -199,7 +199,7 @@ def _limit(value: float) -> float:
 def _note_features(
     learner: Learner, places: Floats2, anchor: Floats, moves: Ints2, first: int, t: int
 ) -> None:
-    """Note the last three moves, those of the decoded point around them, and the distance left.
+    """Set features: the last three moves, the decoded ones around them, and the distance left.
 
     ``places[f + 1]`` is where it is in frame f.
     """
@@ -215,7 +215,7 @@ def _note_features(
 
 
 def _note_leader(learner: Learner, leader: Leader, at: int, step: float) -> None:
-    """Note the change of the shift of this point's leader, and its last value."""
+    """Set features: the change of the shift of this point's leader, and its last value."""
     stands, shifts = leader.stands, leader.shifts
     features = learner.features
     for axis in range(3):

@@ -2,7 +2,7 @@
 
 SPEC.md, "Pose metric", is normative. A factor holds for each kept channel c the entries L of the
 channels above it in its block, and last 1 / root(D): G + regularization = L' D L. So a row x of
-values becomes y = root(D) L x, of which one step is one step of the points' mean squared error.
+values becomes y = root(D) L x, in which one step is one step of the points' mean squared error.
 
 Poses go through in batches of ``LANES``, see ``pose_kernels``. A single pose has a kernel of its
 own; both give the same bits. A course is the approximations of a segment, row by row, each at the
@@ -21,9 +21,9 @@ from mcz.kernels import kernel
 from mcz.kernels.types import Floats, Floats2, Floats3, Ints
 
 LANES = 8
-GREATEST = 2.0**120  # of entries of the metric, whose products then stay finite
+GREATEST = 2.0**120  # bound of entries of the metric, whose products then stay finite
 
-# A power of 4, that of which 1 / root is taken off, and the root itself.
+# A power of 4, its inverse, and the inverse of its root.
 OCTAVES = tuple((2.0 ** (2 * n), 2.0 ** (-2 * n), 2.0**-n) for n in (64, 32, 16, 8, 4, 2, 1))
 LIFT, LIFT_ROOT = 2.0**102, 2.0**51
 HALF_ROOT = 0.7071067811865476
@@ -49,7 +49,7 @@ def factor_batches(plan: Plan, batch: Lanes, values: Floats2, factors: Floats2, 
 
 @kernel
 def factor_one(plan: Plan, batch: Lanes, values: Floats2, factors: Floats2) -> None:
-    """The same of poses one by one."""
+    """Fill ``factors`` pose by pose, without batches."""
     factor_rows(plan, batch, values, factors, 1, 1)
 
 
@@ -139,7 +139,7 @@ def _force(inertia: Floats2, motion: Floats2, force: Floats2, lanes: int) -> Non
 def _eliminate(
     plan: Plan, batch: Lanes, entries: Floats2, pivots: Floats, width: int, lanes: int
 ) -> None:
-    """Entries of G to those of L, from the last channel to the first, without any new entry.
+    """Turn entries of G into those of L, from the last channel to the first, without fill-in.
 
     Two channels that are neighbors on a path go together: what is above both is read and written
     once.
@@ -174,7 +174,7 @@ def _take_pivot(
     pivots: Floats,
     lanes: int,
 ) -> None:
-    """Note a row of G and its pivot, and make it a row of L."""
+    """Save a row of G and its pivot, and turn it into a row of L."""
     start, above = plan.starts[number], plan.starts[number + 1] - plan.starts[number] - 1
     added = plan.regularization[number]
     least = 0.5 * added
@@ -192,7 +192,7 @@ def _take_pivot(
 def _subtract(
     entries: Floats2, top: int, i: int, own: Floats2, shares: Floats2, lanes: int
 ) -> None:
-    """Subtract the share of ``row`` from the row at ``top``, that of channel i of a path."""
+    """Subtract ``own`` times its share from the row at ``top``, that of channel i of a path."""
     for k in range(i + 1):
         for p in range(lanes):
             entries[top + k, p] -= shares[i, p] * own[k, p]

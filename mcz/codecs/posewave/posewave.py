@@ -178,6 +178,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
 def _segments(
     source: SignalSource, header: Header, choice: Choice, params: Params
 ) -> Iterator[Segment]:
+    """Yield the segments of a signal, each of as many frames as its size allows."""
     layout = source.layout
     skeleton = skeleton_of(NAME, layout)
     if not layout.n_channels:

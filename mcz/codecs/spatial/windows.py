@@ -230,6 +230,7 @@ def _segment(
     request: Request,
     out: Floats,
 ) -> None:
+    """Fill the requested frames of one segment into ``out``, window by window."""
     n_windows = -(-span.n_frames // fields.window)
     where = f"{NAME}: segment at {span.first}"
     for number, part in enumerate(windows_of(stream, n_windows, where)):

@@ -42,7 +42,7 @@ def to_trc(motion: Motion) -> Motion:
 
 
 def to_storage(motion: Motion) -> Motion:
-    """Its motion signal, a column a channel."""
+    """The motion with only its motion signal, a column a channel."""
     return replace(motion, signals=motion.signals[:1])
 
 

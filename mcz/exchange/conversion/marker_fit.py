@@ -146,6 +146,7 @@ def _fit(
     virtual: NDArray[np.float64] | None,
     samples_per_frame: int,
 ) -> Fit:
+    """Distances of the points and virtual markers of ``values`` from those ``seen``."""
     if virtual is None:
         points, markers = positions_of(base, values), np.zeros((len(values), 0, 3))
     else:

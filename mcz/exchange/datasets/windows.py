@@ -227,9 +227,9 @@ class Dataset:
         return statistics_of(self._blocks, self.members)
 
     def normalized(self, statistics: Mapping[str, FieldStatistics] | None = None) -> Dataset:
-        """The same windows less the mean of each field, divided by the standard deviation.
+        """A copy whose fields have their mean subtracted and are divided by their deviation.
 
-        ``statistics`` of another data set, the training part, say, or by default the own ones.
+        ``statistics``: those of another data set, such as the training part; by default its own.
         Raises OptionError if they lack a field.
         """
         scales = dict(self.statistics() if statistics is None else statistics)
@@ -366,7 +366,7 @@ class Dataset:
         return [label_of(m, clip, by, pattern) for m, clip in zip(self.members, clips, strict=True)]
 
     def torch(self) -> Any:
-        """As a ``torch.utils.data.Dataset``, an item a dict of tensors, (window, ...).
+        """A ``torch.utils.data.Dataset`` whose items are dicts of tensors, (window, ...).
 
         Raises OptionError if PyTorch is not installed (``mcz[torch]``).
         """

@@ -248,7 +248,7 @@ class StrictFrames:
         return self._stream.size
 
     def frames(self) -> Iterator[LiveFrame]:
-        """As ``live_frames``."""
+        """Yield the frames, as ``live_frames`` does."""
         head = b""
         shared: Shared = {}
         clip: ClipState | _WholeClip | None = None

@@ -90,7 +90,7 @@ class FramesWithLosses:
         self._summary.is_checked = bool(self._all_checked)
 
     def _note(self, fault: Fault) -> None:
-        """Note a damaged or wrong chunk; a chunk at a wrong place is no fault."""
+        """Record a damaged or wrong chunk; a chunk at a wrong place is no fault."""
         if isinstance(fault.error, UnsupportedError) or self._parser.is_done:
             raise fault.error
         if not fault.state:
@@ -311,7 +311,7 @@ class Concealer:
         yield LiveFrame(number - self._first, row, valid)  # LIVE-02
 
     def reach(self, number: int) -> Iterator[LiveFrame]:
-        """Note that no frame before ``number`` will come."""
+        """Conceal or report all missing frames before ``number``."""
         if self.due is None:
             self.due = max(self._first, number)
             self.is_whole = self.due == self._first
@@ -335,7 +335,7 @@ class Concealer:
                 yield self._substitute(self.due - 1)
 
     def end(self) -> Iterator[LiveFrame]:
-        """Note that no frame follows the missing ones."""
+        """Yield substitutes for the missing frames at the end of a clip."""
         owed, self._owed = self._owed, 0
         for number in range((self.due or 0) - owed, self.due or 0):
             yield self._substitute(number)

@@ -109,7 +109,7 @@ def _known_names(name: str, clips: Collection[Clip]) -> list[str]:
 
 
 def _metadata(key: str, clip: Clip) -> Value:
-    """Its value; CLIP is not read if a later META decides."""
+    """The value of a metadata key; CLIP is not read if a later META has it."""
     last = _last_record(key, clip)
     return clip.metadata.get(key) if last is None else last.entries.get(key)
 

@@ -105,7 +105,7 @@ class _Check:
         self.seen.faults.append((at, text))
 
     def _take_fault(self, fault: Fault) -> None:
-        """Note a fault of a checksum, or of the grammar if everything before is known."""
+        """Record a fault of a checksum, or of the grammar after bytes that are all understood."""
         event, chunk = fault.event, fault.chunk
         if isinstance(fault.error, UnsupportedError):
             raise fault.error

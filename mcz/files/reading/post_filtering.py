@@ -129,7 +129,7 @@ class FilteredClip(Clip):
     def motion(
         self, frames: tuple[int, int] | None = None, resolution: int = 0, *, decimate: bool = False
     ) -> Motion:
-        """As of any clip, without a source."""
+        """The filtered motion, without a source."""
         motion = super().motion(frames, resolution, decimate=decimate)
         return _with_positions(motion, motion.signals[0].values)
 

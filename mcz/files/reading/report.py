@@ -114,6 +114,7 @@ def _model_info(container: Container, id_: bytes) -> JsonObject:
 
 
 def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
+    """The entry of a clip in the document of ``info``."""
     rate, source = clip.frame_rate, clip.source
     beside, unread = _facts_beside_values(clip)
     document = {

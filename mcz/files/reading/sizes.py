@@ -22,16 +22,16 @@ from mcz.files.reading.signal_info import SignalInfo
 from mcz.model.schema import build
 from mcz.model.text_format import first_names
 
-MOST_NAMED = 4  # joints of a group that are named
+MOST_NAMED = 4  # most joints of a group in its name
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
     """The bytes of one clip by part; ``models`` are the models that its codecs need, in the file.
 
-    ``packets`` is the part of ``overhead`` that frames open DATA and their packets, ``between`` are
-    the whole ancillary chunks between CLIP and CEND, ``template`` is the part of ``source`` that
-    other clips may share.
+    ``packets``: the part of ``overhead`` for the framing of open DATA and packets; ``between``: all
+    ancillary chunks between CLIP and CEND; ``template``: the part of ``source`` that clips may
+    share.
     """
 
     payload: int = 0
@@ -152,15 +152,15 @@ def _alias_bytes(file: File, name: str) -> int:
     if of == payloads.OF_SKELETON:
         source = file.skeleton(target, with_source=True).source
         return source.size if source is not None else 0
-    called = target.decode("utf-8", "replace")
+    name_of_target = target.decode("utf-8", "replace")
     if of == payloads.OF_ATTACHMENT:
-        return file.attachments[called].size
-    clip_source = file.clips[called].source
+        return file.attachments[name_of_target].size
+    clip_source = file.clips[name_of_target].source
     return clip_source.size if clip_source is not None else 0
 
 
 def file_ratio(file: File) -> float | None:
-    """Bytes of the stored files for a byte of the file, None if unknown."""
+    """Bytes of stored files per byte of the file; None if unknown."""
     try:
         return _stored_bytes(file) / file.size or None
     except (FormatError, KeyError):  # salvaged: the named ones are lost
@@ -171,9 +171,9 @@ def file_ratio(file: File) -> float | None:
 class Share:
     """Bytes of a group's streams of one sort in all segments; all of them sum to the payload.
 
-    ``name`` lists the joints of the group, or its channels, the first of many. ``resolution``
-    counts as stored, from 0, the coarsest; None outside of the codec: exceptions, masks, frame
-    notes (whose group is None).
+    ``name`` lists the first joints of the group, or its first channels. ``resolution`` counts as
+    stored, from 0, the coarsest; None outside of the codec: exceptions, masks, frame notes (whose
+    group is None).
     """
 
     signal: str
@@ -214,9 +214,9 @@ def by_group(shares: Iterable[Share]) -> dict[str, dict[int | None, int]]:
     several = len({share.signal for share in shares}) > 1
     groups: dict[str, dict[int | None, int]] = {}
     for share in shares:
-        of = share.name or "frame notes"
-        own = groups.setdefault(f"{share.signal}: {of}" if several else of, {})
-        own[share.resolution] = own.get(share.resolution, 0) + share.n_bytes
+        label = share.name or "frame notes"
+        totals = groups.setdefault(f"{share.signal}: {label}" if several else label, {})
+        totals[share.resolution] = totals.get(share.resolution, 0) + share.n_bytes
     return groups
 
 
@@ -282,9 +282,9 @@ def group_names(clip: Clip, signal: SignalInfo) -> list[tuple[int, str]]:
         channels = [f"{name}.{c.label}" for name, joint in joints for c in joint.channels]
     names = []
     for number, group in enumerate(signal.layout.groups):
-        called = channels if len(group) == 1 else owners
+        labels = channels if len(group) == 1 else owners
         names.append(
-            (number, first_names(list(dict.fromkeys(called[c] for c in group)), MOST_NAMED))
+            (number, first_names(list(dict.fromkeys(labels[c] for c in group)), MOST_NAMED))
         )
     return names
 
@@ -308,11 +308,11 @@ def _segment_parts(at: int, segment: _Segment) -> Iterator[tuple[int, int, str]]
     if table.size:
         yield at, table.size, f"stream table, {label}"
     names = {table.frame_notes(): "frame notes"}
-    for group, called in enumerate(segment.groups[: table.counts.n_groups]):
-        names[table.group_notes(group)] = f"notes of {called}"
-        names[table.mask(group)] = f"mask of {called}"
+    for group, group_name in enumerate(segment.groups[: table.counts.n_groups]):
+        names[table.group_notes(group)] = f"notes of {group_name}"
+        names[table.mask(group)] = f"mask of {group_name}"
         for resolution in range(table.counts.n_resolutions):
-            text = called
+            text = group_name
             if table.counts.n_resolutions > 1:
                 text += f", stored resolution {resolution}"
             names[table.codec(resolution, group)] = text

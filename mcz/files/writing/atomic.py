@@ -85,7 +85,7 @@ def replacing(target: Target, *, force: bool, inputs: Iterable[object] = ()) -> 
 def replacing_file(
     target: Target, *, force: bool, inputs: Iterable[object] = ()
 ) -> Iterator[BinaryIO]:
-    """As ``replacing``, for an MCZ file: it is read again, strictly, before it gets its name.
+    """``replacing`` for an MCZ file, which is read again, strictly, before it gets its name.
 
     The stream can be read. Also raises FormatError if the new file breaks a rule.
     """

@@ -29,14 +29,14 @@ from mcz.sources import recording_of, with_analog_scales
 
 EXACT_ROLES = {"times": "they order the frames", "residuals": "they say which points are valid"}
 FLOATS = (GridKind.BINARY32, GridKind.VAX_F)
-MOST_MULTIPLES = 2**19  # of a step in a number; beyond, fast may find no unit
+MOST_MULTIPLES = 2**19  # steps in a number, beyond which fast may find no unit
 SHORT_BITS = 8  # bits of a unit of floats: few of its multiples are rounded then
 TRIALS = 10
-GOOD_ENOUGH = 0.97  # of a requested mean error: near enough
+GOOD_ENOUGH = 0.97  # share of a requested mean error at which the search ends
 
 
 def with_bounds(motion: Motion, codec: Codec, options: Params) -> tuple[Motion, dict[str, str]]:
-    """``motion`` with coarser signals as the bounds ``options`` for allow.
+    """``motion`` with signals as coarse as the bounds in ``options`` allow.
 
     Also returns entries of the quality record. Raises OptionError for a bad bound.
     """
@@ -96,7 +96,7 @@ class Column:
     def values_of(self, numbers: Floats) -> Floats:
         return (numbers - self.offset) * self.scale * self.general
 
-    def on(self, grid: Grid, numbers: Floats) -> Column | None:
+    def with_numbers(self, grid: Grid, numbers: Floats) -> Column | None:
         """The column with other numbers, except kept ones; None if that is impossible."""
         numbers = np.where(self.kept, self.numbers, numbers + 0.0)  # no -0
         with np.errstate(all="ignore"):
@@ -114,7 +114,7 @@ def _can_hold(old: Grid, new: Grid) -> bool:
 def _coarsen(
     motion: Motion, signal: Signal, greatest: Floats, mean: Floats
 ) -> tuple[Motion, Signal]:
-    """The signal within these bounds of each channel, and the motion with a source of it."""
+    """The motion, with a source that fits, and the signal within the bounds of each channel."""
     source = list(_columns(signal))
     of_c3d = recording_of(motion.source) is not None
     rescales = of_c3d and signal.role == "analog" and _states_scales(motion.source, source)
@@ -187,7 +187,7 @@ class SourceRules:
 
 
 def _coarsen_column(column: Column, greatest: float, mean: float, rules: SourceRules) -> Column:
-    """The column on the coarsest numbers within the bounds, unchanged if none is smaller."""
+    """The column with the coarsest numbers within the bounds; unchanged if that saves nothing."""
     unit = abs(column.scale * column.general)
     most = 2 * greatest
     step, best, least = min(most, 4 * mean), column, 0.0
@@ -216,38 +216,40 @@ def _mean_error(column: Column, rounded: Column, greatest: float) -> float:
 
 
 def is_within(source: Floats, rounded: Floats, bound: float) -> Bools:
-    """True where |given - rounded| <= bound, without any rounding."""
+    """True where |source - rounded| <= bound, exactly."""
     if bound == math.inf:
         return np.isfinite(rounded)
     with np.errstate(all="ignore"):
         error = source - rounded
         back = error - source
-        rest = (source - (error - back)) - (rounded + back)  # of the subtraction
+        rest = (source - (error - back)) - (rounded + back)  # rounding error of the subtraction
         at_bound = (np.abs(error) == bound) & (rest * np.sign(error) <= 0)
         return np.asarray((np.abs(error) < bound) | at_bound)
 
 
 def _round_column(column: Column, step: float, unit: float, rules: SourceRules) -> Column | None:
     """The column on numbers ``step`` apart, in its unit; None if there are none."""
-    kind, numbers, own = column.grid.kind, column.numbers, step / unit
+    kind, numbers, own_step = column.grid.kind, column.numbers, step / unit
     with np.errstate(all="ignore"):
         if kind in FLOATS:
-            return _on_floats(column, column.grid, own)
+            return _on_floats(column, column.grid, own_step)
         if column.grid.is_text and (rules.has_source or column.kept.any()):
-            digits = min(max(math.ceil(-math.log10(own) - 1e-9), 0), 22)
+            digits = min(max(math.ceil(-math.log10(own_step) - 1e-9), 0), 22)
             grid = Grid(GridKind.FIXED, digits)
-            return column.on(grid, grid.values(grid.ordinals(numbers)[0]))
+            return column.with_numbers(grid, grid.values(grid.ordinals(numbers)[0]))
         if kind == GridKind.INTEGER:
-            own = 2 * math.floor(own / 2) + 1.0
+            own_step = 2 * math.floor(own_step / 2) + 1.0
         if rules.of_c3d:
-            return _rescale(column, own) if rules.rescales and kind == GridKind.INTEGER else None
-        own *= 1 - 2.0**-40 if kind != GridKind.INTEGER else 1  # for the rounding of products
+            return (
+                _rescale(column, own_step) if rules.rescales and kind == GridKind.INTEGER else None
+            )
+        own_step *= 1 - 2.0**-40 if kind != GridKind.INTEGER else 1  # for the rounding of products
         if column.kept.any() and kind != GridKind.INTEGER:
-            return _on_floats(column, Grid(GridKind.BINARY32), own)
-        if not MIN_SCALE <= own <= MAX_SCALE:
+            return _on_floats(column, Grid(GridKind.BINARY32), own_step)
+        if not MIN_SCALE <= own_step <= MAX_SCALE:
             return None
-        grid = Grid(GridKind.SCALED, scale=own)
-        return column.on(grid, grid.values(grid.ordinals(numbers)[0]))
+        grid = Grid(GridKind.SCALED, scale=own_step)
+        return column.with_numbers(grid, grid.values(grid.ordinals(numbers)[0]))
 
 
 def _on_floats(column: Column, grid: Grid, step: float) -> Column | None:
@@ -257,11 +259,11 @@ def _on_floats(column: Column, grid: Grid, step: float) -> Column | None:
     numbers = np.where(column.kept, 0.0, column.numbers)
     if not 2.0**-140 <= unit <= 2.0**79 or np.abs(numbers).max(initial=0) > MOST_MULTIPLES * unit:
         return None
-    return column.on(grid, grid.values(grid.ordinals(np.rint(numbers / unit) * unit)[0]))
+    return column.with_numbers(grid, grid.values(grid.ordinals(np.rint(numbers / unit) * unit)[0]))
 
 
 def _rescale(column: Column, step: float) -> Column | None:
-    """Words of a converter that is coarser by ``step``, which the source then states."""
+    """Words of a converter that is coarser by ``step``; the source states the new scale."""
     scale = float(np.float32(column.scale * step))
     if step < 2 or not math.isfinite(scale):
         return None

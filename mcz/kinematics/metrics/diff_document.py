@@ -95,6 +95,7 @@ def pairs_of(a: Skeleton, b: Skeleton) -> list[tuple[int, int]]:
 def _measure_joints(
     result: JointErrors, original: Motion, other: Motion, pairs: list[tuple[int, int]], scale: float
 ) -> JointErrors:
+    """Measure the distances of the origins of ``pairs`` of joints, a block at a time."""
     left, right = (list(side) for side in zip(*pairs, strict=True))
     total, count, worst, where = 0.0, 0, -1.0, (0, 0)
     n_rows, per_frame = original.signals[0].n_rows, original.signals[0].samples_per_frame

@@ -60,7 +60,7 @@ class Camera:
         return pixels, scale
 
     def at(self, target: Floats) -> Camera:
-        """The same camera, moved to look at ``target``."""
+        """A copy, moved to look at ``target``."""
         return Camera(self.axes, target, self.distance, self.view)
 
 

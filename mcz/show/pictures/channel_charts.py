@@ -111,6 +111,7 @@ class _ChartData:
 
 
 def _chart_data(motion: Motion, selection: Selection, first: int) -> _ChartData:
+    """The series of the selected channels, with their times and names."""
     index = _signal_of(motion, selection)
     signal, timeline = motion.signals[index], motion.timeline
     at, when = times_of(motion, first, index)

@@ -53,7 +53,7 @@ class RegisteredFile(Protocol):
         ...
 
     def open(self) -> Contents:
-        """Its bytes; raises as ``target``."""
+        """Open its bytes; raises as ``target``."""
         ...
 
 

@@ -116,6 +116,7 @@ class Handler(BaseHTTPRequestHandler):
             raise Refused(404, "there is nothing here")
 
     def _file(self, number: int) -> None:
+        """Answer a GET or HEAD of a file, or of a range of its bytes."""
         try:
             file = self._site.registry[number]
         except KeyError:

@@ -225,6 +225,7 @@ def _motion(
     notes: Sequence[str] = (),
     library: Library | None = None,
 ) -> Motion:
+    """The motion in ``arrays`` of one clip, or of ``library``, with its source."""
     if library is None:
         interpretation = interpret_arrays(arrays)
         placed = {k: Placed(arrays[k].head, *place) for k, place in interpretation.places.items()}

@@ -175,7 +175,7 @@ class Machine:
         return at, stop, size
 
     def _leave_frame(self) -> None:
-        """Note the frame that ends here; one that ends within an opcode is no frame to restore."""
+        """Store the frame that ends here; one that ends within an opcode is not restored."""
         stop = self._frame[2]
         if stop and self.at >= stop:
             if self.at == stop:

@@ -292,6 +292,7 @@ def _rows(data: bytes, head: _Head, time: int | None) -> tuple[TableRows, list[i
 
 
 def _head(data: bytes, encoding: str) -> _Head:
+    """The layout of a table of numbers: separator, columns, the lines above its rows."""
     lines = whole_cells(lines_from(data, 0))
     row = first_row(lines)
     if row is None:

@@ -251,6 +251,7 @@ def read_storage(data: bytes, name: str = "motion", *, format_name: str) -> Moti
 
 
 def _storage_header(data: bytes) -> _StorageHeader:
+    """Parse the keys above the rows of an STO or MOT file."""
     end = _END.search(data)
     if end is None:
         raise SourceError("no line 'endheader'; not an STO or MOT file, or truncated", line=1)

@@ -146,6 +146,7 @@ def _parts(data: bytes, encoding: str) -> list[_Part]:
 def _part(
     data: bytes, start: int, lines: tuple[bytes, int, int, int], stop: int, encoding: str
 ) -> _Part:
+    """Read one part of the file: its title, rate, labels, axes and rows."""
     separator, axis, below, rows = lines
     above: list[tuple[int, int]] = []
     end = axis

@@ -193,7 +193,7 @@ class _RowScanner:
             new[: len(array)] = array
 
     def _learn(self, at: int, tokens: list[Token], end: int) -> int:
-        """Note the tokens of a row and its pattern; returns where its last token ends."""
+        """Store the tokens of a row and its pattern; return the end of its last token."""
         self.start[self.row] = self.stop[self.row] = 0  # what a match that failed has left
         for start, stop, column in tokens:
             if column == FRAME_NUMBER:

@@ -162,7 +162,7 @@ def solve(normal: Floats2) -> bool:
 
 
 def multiply(steps: Floats, room: Floats2) -> None:
-    """Note the products of steps with those of up to N_TAPS rows before."""
+    """Compute the products of steps with those of up to N_TAPS earlier rows."""
     for lag in range(head.N_TAPS + 1):
         products = room[PRODUCTS + lag]
         for row in range(lag, len(steps)):

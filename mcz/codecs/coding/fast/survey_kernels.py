@@ -133,7 +133,7 @@ def count_from(column: Ints, least: int) -> int:
 
 
 def set_limit(column: Ints, plan: Ints, margin: int) -> None:
-    """Note the limit: few rows may exceed the classes of all others by more than ``margin``."""
+    """Set the limit: few rows may exceed the classes of all others by more than ``margin``."""
     plan[LIMIT] = -1
     few = len(column) // FEW
     high = class_of(plan[MOST], plan)
@@ -162,7 +162,7 @@ def most_within(column: Ints, plan: Ints) -> int:
 
 
 def choose_form(column: Ints, form: int, used: int, plan: Ints) -> None:
-    """Note form, greatest class and limit for a column whose magnitudes have the bits ``used``."""
+    """Set form, greatest class and limit for a column whose magnitudes have the bits ``used``."""
     plan[head.REST], plan[head.TOP] = -1, 0
     head.set_form(plan, form, 0)
     if plan[head.BASE] == 2 and used:
@@ -251,7 +251,7 @@ def are_steps(channels: Channels, n: int) -> bool:
 
 @kernel
 def choose_steps(channels: Channels) -> None:
-    """Note which coded channels are steps, after units were found."""
+    """Mark the coded channels that are steps, after units were found."""
     for n in range(len(channels.plans)):
         if channels.plans[n, head.KIND] == head.CODED and are_steps(channels, n):
             channels.plans[n, head.KIND] = head.STEPS
