@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import bz2
 import gzip
+import json
 import lzma
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 import mcz
-from tests.commands import run, run_piped
+from tests.commands import ROOT, run, run_piped
 
 
 @pytest.fixture
@@ -106,3 +108,51 @@ def test_a_name_of_half_a_million_characters_in_a_plot(
     assert run("plot", "long.csv", "-o", "long.svg") == 0
     assert len(capsys.readouterr().out) < 1000
     assert Path("long.svg").stat().st_size < 100_000
+
+
+NAMED_BY_DATA = ("metadata", "quality", "counts", "joints", "channels", "parameters")
+
+
+def json_keys(value: object) -> Iterator[str]:
+    """The keys of all objects in a document, except those that are names of data."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield key
+            if key not in NAMED_BY_DATA:
+                yield from json_keys(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from json_keys(inner)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("info", "walk.mcz"),
+        ("info", "walk.bvh"),
+        ("info", "walk.mcz", "--validate"),
+        ("list", "walk.mcz"),
+        ("decode", "walk.mcz", "-o", "again.bvh"),
+        ("extract", "walk.mcz", "part.mcz", "--frames", "0:50"),
+        ("verify", "walk.mcz"),
+        ("bag", "walk.mcz", "bag"),
+        ("codecs", "raw"),
+        ("pack", "walk", "packed.mcz"),
+        ("unpack", "walk.mcz", "out"),
+        ("diff", "walk.bvh", "walk.mcz"),
+        ("sample", "samples"),
+    ],
+)
+def test_the_manual_has_every_key(
+    folder: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    Path("walk").mkdir()
+    Path("walk/a.bvh").write_bytes(Path("walk.bvh").read_bytes())
+    capsys.readouterr()
+    assert run(*words, "--json") == 0
+    keys = set(json_keys(json.loads(capsys.readouterr().out)))
+    page = (ROOT / "docs/reference/scripts.md").read_text("utf-8")
+    ids = ("docs/reference/measures.md", "docs/guides/contacts.md")  # of metrics
+    measures = "".join((ROOT / name).read_text("utf-8") for name in ids)
+    known = set(re.findall(r"\w+", page + measures))
+    assert {key.split(".")[0] for key in keys} <= known
