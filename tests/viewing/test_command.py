@@ -151,7 +151,7 @@ def test_visitors_may_come_back() -> None:
     [
         (("none.bvh",), 1, "none.bvh: no such file"),
         (("walk.asf",), 2, "unsupported suffix; it must be one of"),
-        (("walk.bvh", "--host", "0.0.0.0"), 2, "this machine alone"),
+        (("walk.bvh", "--host", "0.0.0.0"), 2, "only to this machine"),
         (("walk.bvh", "--port", "99999"), 2, "99999"),
         (("walk.bvh", "--codec", "lossy"), 2, "--codec applies only with -o"),
         (("walk.bvh", "--clip", "walk"), 2, "--clip applies only with -o"),

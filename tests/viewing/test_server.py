@@ -392,7 +392,7 @@ def test_a_request_cannot_hide_another(server: Server) -> None:
 
 def test_only_this_machine_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
     for host in ("0.0.0.0", "", "example.org", "192.168.0.1"):
-        with pytest.raises(OptionError, match="this machine alone"):
+        with pytest.raises(OptionError, match="only to this machine"):
             Server(page(), FileRegistry(), host=host)
     with Server(page(), FileRegistry()) as server, pytest.raises(AccessError):
         Server(page(), FileRegistry(), port=server.site.port)
