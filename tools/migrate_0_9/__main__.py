@@ -37,6 +37,10 @@ def read(python: str, path: str | None, old: str, folder: str) -> None:
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     if path is not None:
         environment["PYTHONPATH"] = path
+    version = [python, "-c", "from importlib.metadata import version; print(version('mcz'))"]
+    found = subprocess.run(version, env=environment, check=False, capture_output=True, text=True)
+    if path is None and not found.stdout.startswith("0.9."):
+        sys.exit(f"{python}: package 0.9 is not installed there")
     words = [python, str(READER), str(Path(old).resolve()), folder]
     if subprocess.run(words, env=environment, check=False).returncode:
         sys.exit(f"{old}: package 0.9 does not read it; mend it there first (mcz repair)")
