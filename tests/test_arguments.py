@@ -92,3 +92,14 @@ def test_defaults_pass_and_missing_arguments_are_left_to_python() -> None:
     with pytest.raises(OptionError, match="unit is 5"):
         function(3, 5)  # type: ignore[arg-type]
     assert "rate" not in USUAL_TYPES  # rates have checks of their own
+
+
+def test_formats_rules_and_compared_motions(tmp_path: Path) -> None:
+    motion = walk()
+    with pytest.raises(OptionError, match="to is 'docx'; it must be one of csv, npz"):
+        mcz.conversion_losses(motion, "docx")
+    wrong: Any = "foot"
+    with pytest.raises(OptionError, match="rule is 'foot'; it must be a ContactRule"):
+        mcz.contacts(motion, rule=wrong)
+    with pytest.raises(OptionError, match="other is 'foot'; it must be a Motion or a Clip"):
+        mcz.plot(motion, tmp_path / "error.svg", other=wrong)

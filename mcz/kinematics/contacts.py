@@ -16,7 +16,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics.joint_names import find_feet
 from mcz.kinematics.points import first_points, positions_of
-from mcz.model.checks import check_arguments
+from mcz.model.checks import ArgumentType, check_arguments
 from mcz.model.motion import A_MOTION, Motion, Skeleton
 from mcz.model.skeleton import column_of, joint_list, signs_of
 from mcz.model.text_format import count_text, fields_text, named
@@ -47,6 +47,7 @@ class ContactRule:
 
 
 RULE = ContactRule()
+A_RULE = ArgumentType("a ContactRule", lambda value: isinstance(value, ContactRule))
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +100,7 @@ class Contacts:
         return standing
 
 
-@check_arguments(motion=A_MOTION)
+@check_arguments(motion=A_MOTION, rule=A_RULE)
 def contacts(
     motion: Motion, joints: Sequence[int | str] | None = None, rule: ContactRule = RULE
 ) -> Contacts:

@@ -10,7 +10,7 @@ import numpy as np
 from mcz.files.reading.source_files import recording
 from mcz.kinematics.points import point_set
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
-from mcz.model.checks import STRING, check_arguments
+from mcz.model.checks import ArgumentType, check_arguments
 from mcz.model.clock import TIMES, TOLERANCE, numbers_or_rows
 from mcz.model.motion import A_MOTION, Motion
 from mcz.sources.c3d.plain import KNOWN
@@ -23,6 +23,8 @@ SCENES = ("glb", "usda")
 GROUPS = ("POINT", "ANALOG", "FORCE_PLATFORM", "EVENT", "TRIAL")  # of C3D, written or named
 SHAPED = ("bvh", "amc", *POINTS, *SCENES)  # a skeleton or its points
 UNNUMBERED = ("bvh", "sto", "mot", *SCENES)
+FORMATS = ("csv", "npz", "bids", "sto", "mot", *SHAPED)
+FORMAT = ArgumentType(f"one of {', '.join(FORMATS)}", lambda value: value in FORMATS)
 HELD_ROLES = {"c3d": KNOWN}  # formats that hold other signals, and the roles of these
 ROOT = "root"  # the only name that ASF has for it
 
@@ -35,12 +37,13 @@ def keep_supported_signals(motion: Motion, to: str) -> Motion:
     )
 
 
-@check_arguments(motion=A_MOTION, to=STRING)
+@check_arguments(motion=A_MOTION, to=FORMAT)
 def conversion_losses(motion: Motion, to: str) -> tuple[str, ...]:
     """List the facts of ``motion`` that a file of the format ``to`` cannot hold, a text each.
 
-    ``to`` is "csv", "npz", "glb", "usda" or a format of ``mcz.convert``. Metadata are left out of
-    every format, and are not listed. An impossible conversion raises its own error.
+    ``to`` is "csv", "npz", "glb", "usda", "bids" or a format of ``mcz.convert``. Metadata are left
+    out of every format, and are not listed. Raises OptionError for another format. An impossible
+    conversion raises its own error.
     """
     return tuple(_conversion_losses(motion, to))
 

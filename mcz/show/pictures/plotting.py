@@ -244,7 +244,7 @@ class Plotted:
     notes: tuple[str, ...] = ()
 
 
-@check_arguments(motion=MOTION_OR_CLIP, path=PATH, frames=FRAMES)
+@check_arguments(motion=MOTION_OR_CLIP, path=PATH, other=MOTION_OR_CLIP, frames=FRAMES)
 def plot(
     motion: MotionLike,
     path: str | os.PathLike[str],
