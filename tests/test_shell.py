@@ -14,10 +14,9 @@ from mcz import Channel, Joint, Motion, OptionError, Signal, Skeleton
 from mcz.kinematics.points import (
     SHELL_CM,
     origins_of,
+    places_of,
     points_of,
     positions_of,
-    shell_points_of,
-    virtual_markers_of,
 )
 from mcz.sources.sample import acclaim_walk, bvh_walk
 from tests.motions import motions, smooth
@@ -33,18 +32,19 @@ def test_at_rest_the_shell_lies_along_the_axes_of_the_world() -> None:
     """Whatever ``axis`` says, unlike virtual markers, and at the start of a bone, not its end."""
     skeleton = acclaim_walk().skeleton
     rest = np.zeros((1, skeleton.n_channels))
-    shell = shell_points_of(skeleton, rest, 2.0).reshape(skeleton.n_joints, 3, 3)
+    places = places_of(skeleton, rest, markers=True, shell_cm=2.0)
+    shell = places.shell.reshape(skeleton.n_joints, 3, 3)
     origins = origins_of(skeleton, rest)[0]
     assert np.allclose((shell - origins[:, None]) * skeleton.unit_cm, 2 * np.eye(3), atol=1e-12)
-    marked = virtual_markers_of(skeleton, rest).reshape(skeleton.n_joints, 3, 3)
+    marked = places.markers.reshape(skeleton.n_joints, 3, 3)
     assert not np.allclose(shell, marked, atol=0.1)
 
 
 def test_without_axis_and_tails_shell_and_markers_are_the_same() -> None:
     motion = bvh_walk()
     skeleton = replace(motion.skeleton, unit_cm=1.0)
-    shell = shell_points_of(skeleton, motion.values)
-    assert np.allclose(shell, virtual_markers_of(skeleton, motion.values), atol=1e-9)
+    places = places_of(skeleton, motion.values, markers=True, shell_cm=SHELL_CM)
+    assert np.allclose(places.shell, places.markers, atol=1e-9)
     assert SHELL_CM == 3
 
 
@@ -85,13 +85,13 @@ def test_a_radius_is_a_length(radius: float) -> None:
     with pytest.raises(OptionError, match="the radius of the shell is"):
         mcz.compare(hinge([0.0], ""), hinge([0.0], ""), shell_cm=radius)
     with pytest.raises(OptionError, match="the radius of the shell is"):
-        shell_points_of(smooth().skeleton, smooth().values, radius)
+        places_of(smooth().skeleton, smooth().values, shell_cm=radius)
 
 
 def test_a_shell_needs_a_unit() -> None:
     unknown = replace(smooth().skeleton, unit_cm=None)
     with pytest.raises(OptionError, match="length unit .*is unknown.*3 cm.*unit="):
-        shell_points_of(unknown, smooth().values)
+        places_of(unknown, smooth().values, shell_cm=SHELL_CM)
     comparison = mcz.compare(hinge([0.0], unit_cm=None), hinge([9.0], unit_cm=None))
     assert (comparison.shell_mean_cm, comparison.shell_radius_cm, comparison.shell_where) == (
         None,
@@ -137,7 +137,7 @@ def test_beside_plain_sums(motion: Motion, radius: float) -> None:
     comparison = mcz.compare(motion, other, shell_cm=radius)
     with np.errstate(all="ignore"):
         a, b = (
-            shell_points_of(m.skeleton, m.values, radius).reshape(m.n_frames, 4, 3, 3)
+            places_of(m.skeleton, m.values, shell_cm=radius).shell.reshape(m.n_frames, 4, 3, 3)
             for m in (motion, other)
         )
         shell = np.sqrt(((a - b) ** 2).sum(axis=3)).max(axis=2) * 2.5

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.files.reading.source_files import SourceOptions
-from mcz.kinematics.points import origins_of, shell_points_of
+from mcz.kinematics.points import origins_of, places_of
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.signal import Scaling
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
@@ -35,7 +35,10 @@ def apart(before: Motion, after: Motion) -> float:
     kept = [before.skeleton.find(name) for name in after.skeleton.joint_names]
     there = replace(before.skeleton, **unit), before.values
     here = replace(after.skeleton, **unit), after.values
-    shell = [shell_points_of(*both).reshape(before.n_frames, -1, 9) for both in (there, here)]
+    shell = [
+        places_of(*both, shell_cm=3.0).shell.reshape(before.n_frames, -1, 9)
+        for both in (there, here)
+    ]
     steps = (
         origins_of(*there)[:, kept] - origins_of(*here),
         shell[0][:, kept] - shell[1],

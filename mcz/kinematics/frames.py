@@ -175,8 +175,7 @@ class FramePositions:
     """Positions of the points of ``skeleton`` and, on request, its virtual markers.
 
     Maps the channels of a frame, (n_channels,), to (n_places, 3) in length units, NaN if
-    unknown. Results equal ``positions_of`` and ``virtual_markers_of`` to 1e-9, with the same
-    errors.
+    unknown. Results equal those of ``places_of`` to 1e-9, with the same errors.
     """
 
     def __init__(self, skeleton: Skeleton, *, virtual_markers: bool = False) -> None:

@@ -27,8 +27,10 @@ SHELL_CM = 3.0  # from a joint's origin to a point of its shell, the default
 class Places(NamedTuple):
     """Positions over time, each float64 (n_frames, n, 3) in length units.
 
-    ``points`` as in ``positions``, ``markers`` as in ``virtual_markers_of``, ``shell`` as of
-    ``shell_points_of``; empty (n = 0) if not requested.
+    ``points`` as in ``positions``. ``markers``: three a joint, 3 cm off its first point along its
+    local axes x, y and z. ``shell``: three a joint, at a radius from its origin along the axes that
+    turn with it; in the rest pose these are the world's axes, independent of ``axis``. Markers and
+    shell are empty (n = 0) if not requested.
     """
 
     points: Floats
@@ -52,7 +54,7 @@ def positions(motion: Motion) -> Floats:
 
 def positions_of(skeleton: Skeleton, values: Floats) -> Floats:
     """Positions of the points for ``values`` (n_frames, n_channels) in source units."""
-    return _Positions(skeleton, values, points=True).points
+    return _Positions(skeleton, values).points
 
 
 def origins_of(skeleton: Skeleton, values: Floats) -> Floats:
@@ -65,27 +67,8 @@ def origins_of(skeleton: Skeleton, values: Floats) -> Floats:
     return origins
 
 
-def virtual_markers_of(skeleton: Skeleton, values: Floats) -> Floats:
-    """Three markers a joint, 3 cm off its point along its local axes x, y and z.
-
-    float64 (n_frames, 3 n_joints, 3) in length units. A joint's point is the first of its points.
-    Raises OptionError if the length unit is unknown, otherwise as ``positions``.
-    """
-    return _Positions(skeleton, values, markers=True).markers
-
-
-def shell_points_of(skeleton: Skeleton, values: Floats, radius_cm: float = SHELL_CM) -> Floats:
-    """Three points a joint, ``radius_cm`` off its origin along the axes that turn with it.
-
-    float64 (n_frames, 3 n_joints, 3) in length units. In the rest pose these axes are the world's
-    axes, independent of ``axis``. Raises OptionError if the length unit is unknown, otherwise as
-    ``positions``.
-    """
-    return _Positions(skeleton, values, shell_cm=radius_cm).shell
-
-
 def points_and_markers_of(skeleton: Skeleton, values: Floats) -> tuple[Floats, Floats]:
-    """``positions_of`` and ``virtual_markers_of`` from one pass over the joints."""
+    """Points and markers from one pass over the joints."""
     places = places_of(skeleton, values, markers=True)
     return places.points, places.markers
 
@@ -93,8 +76,12 @@ def points_and_markers_of(skeleton: Skeleton, values: Floats) -> tuple[Floats, F
 def places_of(
     skeleton: Skeleton, values: Floats, *, markers: bool = False, shell_cm: float | None = None
 ) -> Places:
-    """Points and, on request, markers and shell, in one pass over the joints."""
-    positions = _Positions(skeleton, values, points=True, markers=markers, shell_cm=shell_cm)
+    """Points and, on request, markers and a shell of this radius, in one pass over the joints.
+
+    Raises OptionError if markers or a shell are requested and the length unit is unknown, otherwise
+    as ``positions``.
+    """
+    positions = _Positions(skeleton, values, markers=markers, shell_cm=shell_cm)
     return Places(positions.points, positions.markers, positions.shell)
 
 
@@ -106,7 +93,6 @@ class _Positions:
         skeleton: Skeleton,
         values: Floats,
         *,
-        points: bool = False,
         markers: bool = False,
         shell_cm: float | None = None,
     ) -> None:
@@ -115,7 +101,7 @@ class _Positions:
         self._firsts = dict(reversed(self._list)) if markers else {}  # earlier points replace later
         self._radius = 0.0 if shell_cm is None else shell_radius(skeleton, shell_cm)
         n_shell = 0 if shell_cm is None else 3 * skeleton.n_joints
-        self.points = np.empty((len(values), len(self._list) if points else 0, 3))
+        self.points = np.empty((len(values), len(self._list), 3))
         self.markers = np.empty((len(values), 3 * len(self._firsts), 3))
         self.shell = np.empty((len(values), n_shell, 3))
         chain = chain_of(skeleton)
@@ -128,13 +114,9 @@ class _Positions:
         points, markers = self.points[rows], self.markers[rows]
         by_joint = markers.reshape(len(markers), len(self._firsts), 3, 3)
         for number, (joint, tail) in enumerate(self._list):
-            first = self._firsts.get(joint) == tail
-            if not (first or points.shape[1]):
-                continue
             point = point_position(chain, joint, tail, columns, pose)
-            if points.shape[1]:
-                points[:, number] = point.T
-            if first:
+            points[:, number] = point.T
+            if self._firsts.get(joint) == tail:
                 by_joint[:, joint] = (point[:, None] + self._distance * pose.axes[joint]).T
         discard_infinite(points)
         discard_infinite(markers)

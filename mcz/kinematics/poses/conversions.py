@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mcz.errors import OptionError
-from mcz.kinematics.chain import IDENTITY
 from mcz.kinematics.frames import (
     MOTION_OR_CLIP,
     Frames,
@@ -25,10 +24,8 @@ from mcz.kinematics.frames import (
     values_of,
 )
 from mcz.kinematics.rotations import (
-    matrices_of_quaternions,
     matrices_of_vectors,
     quaternions_of_matrices,
-    rotate_axes,
     vectors_of_quaternions,
 )
 from mcz.model.checks import FRAMES, check_arguments
@@ -119,60 +116,6 @@ def _euler_angles(quaternions: Floats, order: str) -> Floats:
     for angles in ends:
         angles -= 2 * np.pi * np.rint(angles / (2 * np.pi))
     return np.stack([ends[first], second, ends[third]], axis=1)
-
-
-def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
-    """The inverse of ``from_matrices``: (..., *FORMS[form]) to (..., 3, 3).
-
-    Quaternions may have any length but 0; the second 6D vector is made orthogonal to the first.
-    Raises OptionError if the shape does not fit.
-    """
-    check_form(form)
-    array: Floats = np.asarray(values, np.float64)
-    tail = FORMS[form]
-    if array.shape[-len(tail) :] != tail:
-        raise OptionError(
-            f"rotations as {form!r} must have a shape that ends in {tail}, not {array.shape}"
-        )
-    if form == "matrix":
-        return array
-    outer = array.shape[: -len(tail)]
-    flat = array.reshape(-1, *tail)
-    if form == "6d":
-        return _from_6d(flat).reshape(*outer, 3, 3)
-    if form == "euler":
-        check_order(order)
-    known = np.isfinite(flat).all(axis=1)
-    if form == "quat":
-        known &= flat.any(axis=1)
-    out = np.full((len(flat), 3, 3), np.nan)
-    if known.any():
-        parts = flat[known].T
-        if form == "quat":
-            turns = matrices_of_quaternions(parts / np.abs(parts).max(axis=0))
-        elif form == "rotvec":
-            turns = matrices_of_vectors(parts)
-        else:
-            turns = _matrices_of_euler_angles(parts, order)
-        out[known] = np.moveaxis(turns, 2, 0)
-    return out.reshape(*outer, 3, 3)
-
-
-def _matrices_of_euler_angles(angles: Floats, order: str) -> Floats:
-    steps = list(zip(order.lower(), angles, strict=True))  # extrinsic: intrinsic in reverse order
-    turns = IDENTITY
-    for letter, angle in steps if order.isupper() else reversed(steps):
-        turns = rotate_axes(turns, "xyz".index(letter), angle)
-    return turns
-
-
-def _from_6d(flat: Floats) -> Floats:
-    """Zhou et al. 2019, "On the Continuity of Rotation Representations", equation 15."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        first = flat[:, :3] / np.linalg.norm(flat[:, :3], axis=1, keepdims=True)
-        second = flat[:, 3:] - (first * flat[:, 3:]).sum(axis=1, keepdims=True) * first
-        second /= np.linalg.norm(second, axis=1, keepdims=True)
-    return np.stack([first, second, np.cross(first, second)], axis=2)
 
 
 def continuous_signs(quaternions: Floats) -> Floats:
