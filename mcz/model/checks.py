@@ -9,7 +9,7 @@ import os
 import reprlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
-from functools import wraps
+from functools import partial, wraps
 from itertools import chain
 from numbers import Real
 from types import MappingProxyType
@@ -49,10 +49,14 @@ class ArgumentType(NamedTuple):
     accepts: Callable[[Any], bool]
 
 
-def _are_paths(values: object) -> bool:
+def _are_all(accepts: Callable[[Any], bool], values: object) -> bool:
     if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, Iterable):
         return False
-    return not isinstance(values, Collection) or all(map(PATH.accepts, values))
+    return not isinstance(values, Collection) or all(map(accepts, values))
+
+
+def _is_file(value: object) -> bool:
+    return isinstance(value, (str, os.PathLike, bytes)) or hasattr(value, "read")
 
 
 def _are_numbers(values: Any) -> bool:
@@ -85,7 +89,8 @@ def _is_dtype(value: Any) -> bool:
 
 
 PATH = ArgumentType("a path", lambda value: isinstance(value, (str, os.PathLike)))
-PATHS = ArgumentType("a list of paths", _are_paths)
+PATHS = ArgumentType("a list of paths", partial(_are_all, PATH.accepts))
+FILES = ArgumentType("a list of paths, bytes or streams", partial(_are_all, _is_file))
 STRING = ArgumentType("a string", lambda value: isinstance(value, str))
 MAPPING = ArgumentType("a dict", lambda value: isinstance(value, Mapping))
 NAMES = ArgumentType("a name or a list of names", lambda value: isinstance(value, Iterable))

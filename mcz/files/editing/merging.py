@@ -10,7 +10,6 @@ process would write.
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -48,16 +47,16 @@ from mcz.files.reading.clips import list_some
 from mcz.files.reading.file import File, open
 from mcz.files.writing.atomic import WriteTransaction, check_name, clip_name, replacing_file
 from mcz.files.writing.file import SourceEncoder
-from mcz.model.checks import PATHS, check_arguments
+from mcz.model.checks import FILES, check_arguments
 from mcz.model.schema import parse
 from mcz.model.text_format import count_text, quote_name
 from mcz.model.types import Progress, Target
 from mcz.sources import wants_skeleton
 
 
-@check_arguments(sources=PATHS)
+@check_arguments(sources=FILES)
 def merge(
-    sources: Sequence[str | os.PathLike[str]],
+    sources: Sequence[Target],
     target: Target,
     *,
     rename: bool = False,
@@ -102,7 +101,7 @@ def _share_of_all(files: Sequence[File]) -> float | None:
 
 
 def add_files(
-    sources: Sequence[str | os.PathLike[str]],
+    sources: Sequence[Target],
     before: File,
     transaction: WriteTransaction,
     rename: bool,
@@ -146,7 +145,7 @@ class Merger:
     report: Report = field(default_factory=Report)
 
     @contextmanager
-    def plans(self, sources: Sequence[str | os.PathLike[str]]) -> Iterator[list[tuple[File, Plan]]]:
+    def plans(self, sources: Sequence[Target]) -> Iterator[list[tuple[File, Plan]]]:
         """The files, and the parts of each to copy; raises OptionError as ``merge``."""
         with ExitStack() as stack:
             files = [stack.enter_context(open(source)) for source in sources]
