@@ -310,8 +310,9 @@ def test_rest_poses_that_differ_are_told_of_other_skeletons() -> None:
     )
     other = replace(bones, joints=(bones.joints[0], replace(bones.joints[1], offset=(1, 0, 0))))
     motion = Motion(bones, (Signal(values_for(bones)),))
-    with pytest.warns(mcz.SkeletonWarning, match=r"a by 90 degrees; match_rest="):
+    with pytest.warns(mcz.SkeletonWarning, match=r"a by 90 degrees; match_rest=") as caught:
         retargeted = mcz.retarget(motion, other)
+    assert caught[0].filename == __file__
     np.testing.assert_array_equal(
         retargeted.values, mcz.retarget(motion, other, match_rest=()).values
     )

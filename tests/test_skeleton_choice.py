@@ -66,7 +66,7 @@ def read(path: Path, **options: object) -> tuple[mcz.Motion, list[str]]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         motion = mcz.read(path, **options)
-    assert all(one.category is SkeletonWarning for one in caught)
+    assert all((one.category, one.filename) == (SkeletonWarning, __file__) for one in caught)
     return motion, [str(one.message) for one in caught]
 
 
@@ -193,8 +193,9 @@ def test_encode_says_it_and_keeps_it(tmp_path: Path, call: Call) -> None:
     assert errors.startswith(f"mcz: {path}: its skeleton is {tmp_path / '09.asf'}, the only one")
     shown = call("info", path.with_suffix(".mcz"))[1]
     assert "skeleton-note  ASF the only one that fits: 09.asf" in shown
-    with pytest.warns(SkeletonWarning, match="the only one around"):
+    with pytest.warns(SkeletonWarning, match="the only one around") as caught:
         mcz.encode(path, tmp_path / "b.mcz")
+    assert caught[0].filename == __file__
 
 
 def test_encode_refuses_and_leads_on(tmp_path: Path, call: Call) -> None:

@@ -71,7 +71,7 @@ def read(
             )
         result = read_motion(path, skeleton, data=data)
         if result.remark:
-            warnings.warn(f"{path}: {result.remark}", SkeletonWarning, stacklevel=2)
+            warnings.warn(f"{path}: {result.remark}", SkeletonWarning, stacklevel=3)
         motion = result.motion
     options = SourceOptions(rate=rate, unit=unit, up=up, arrays=arrays, model=model)
     return options.applied_to(motion)

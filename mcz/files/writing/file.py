@@ -382,7 +382,7 @@ def encode(
         _refuse_other_suffix(target)
         transaction.finish()
     if entry.remark:
-        warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
+        warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=3)
     directory, size = transaction.writer.directory, transaction.writer.offset
     written = summarize(directory, size, entry.quality, entry.notes, entry.source_bytes)
     return replace(written, inputs=tuple(map(str, entry.inputs)))

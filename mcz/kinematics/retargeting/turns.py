@@ -187,7 +187,7 @@ def usual_alike(target: Skeleton, source: Skeleton, pairs: Mapping[int, int]) ->
             f"retarget: bones of the rest poses differ: {joined}{more}; match_rest= names those "
             "that are to point as the motion's, () accepts the difference",
             SkeletonWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     return [names[joint] for joint in limbs] if angles.keys() & set(limbs) else []
 
