@@ -46,10 +46,10 @@ class ArgumentType(NamedTuple):
     """A type of arguments in words, and its test."""
 
     words: str
-    accepts: Callable[[Any], bool]
+    accepts: Callable[[object], bool]
 
 
-def _are_all(accepts: Callable[[Any], bool], values: object) -> bool:
+def _are_all(accepts: Callable[[object], bool], values: object) -> bool:
     if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, Iterable):
         return False
     return not isinstance(values, Collection) or all(map(accepts, values))
@@ -59,7 +59,7 @@ def _is_file(value: object) -> bool:
     return isinstance(value, (str, os.PathLike, bytes)) or hasattr(value, "read")
 
 
-def _are_numbers(values: Any) -> bool:
+def _are_numbers(values: object) -> bool:
     try:
         array = np.asarray(values)
     except (TypeError, ValueError):  # rows of different lengths
@@ -75,7 +75,7 @@ def _is_integer(value: object) -> bool:
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
-def _are_frames(value: Any) -> bool:
+def _are_frames(value: object) -> bool:
     if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 2:
         return isinstance(value, slice)
     return all(end is None or _is_integer(end) for end in value)
